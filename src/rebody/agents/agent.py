@@ -1,0 +1,114 @@
+"""An agent: what it remembers, and one decision."""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from rebody.bodies.toys import Toy
+from rebody.control.high_level import HighLevelPolicy
+from rebody.inference import Encoder, EncoderCarry
+from rebody.tasks import FAMILIES, GOAL, VELOCITY
+from rebody.types import Belief, GlobalState, Subgoal, Task, Transition
+
+
+class Observation(eqx.Module):
+    """What an agent hears at a decision; the reward is that of the decision just ended."""
+
+    state: GlobalState
+    reward: Float[Array, "*batch"]
+
+
+class Command(eqx.Module):
+    """What an agent says: an action for a toy, a subgoal for a robot's tracker."""
+
+    action: Float[Array, "*batch 1"]
+    subgoal: Subgoal
+
+
+class Carry(eqx.Module):
+    """What an agent remembers from one decision to the next."""
+
+    encoder: EncoderCarry
+    belief: Belief
+    previous: GlobalState
+    command: Command
+    decisions: Int[Array, ""]
+
+
+class Agent(eqx.Module):
+    """Serves toy and robot alike; holds nothing that learns."""
+
+    encoder: Encoder
+    stride: int = eqx.field(static=True)
+
+    def begin(self, state: GlobalState) -> tuple[Carry, Command]:
+        """The first decision of an episode, when nothing is known."""
+        shape = state.x.shape
+        belief = self.encoder.prior(shape)
+        command = self.command(state, belief)
+        carry = Carry(self.encoder.initial(shape), belief, state, command, jnp.ones((), jnp.int32))
+        return carry, command
+
+    def decide(self, carry: Carry, observation: Observation) -> tuple[Carry, Command]:
+        """Take in the transition since the last decision; speak anew at every `stride`-th."""
+        transition = Transition(carry.previous, observation.reward, observation.state)
+        encoder, belief = self.encoder.step(carry.encoder, transition)
+        fresh = self.command(observation.state, belief)
+        speaks = carry.decisions % self.stride == 0
+        command = jax.tree.map(lambda new, held: jnp.where(speaks, new, held), fresh, carry.command)
+        return Carry(encoder, belief, observation.state, command, carry.decisions + 1), command
+
+    @abstractmethod
+    def command(self, state: GlobalState, belief: Belief) -> Command:
+        """What to do in this state, believing this."""
+
+
+class ReuseAgent(Agent):
+    """The toy's frozen policy, imagined from where the robot is (thesis 5.6.2, 6.4)."""
+
+    high_level: HighLevelPolicy
+    toy: Toy
+    family: int = eqx.field(static=True)
+    horizon: int = eqx.field(static=True)
+
+    def command(self, state: GlobalState, belief: Belief) -> Command:
+        action = self.high_level(state, belief)
+        ahead = self.imagine(state, belief)
+        value = FAMILIES[self.family].achieved(ahead)
+        return Command(action, Subgoal(jnp.full(state.x.shape, self.family), value))
+
+    def imagine(self, state: GlobalState, belief: Belief) -> GlobalState:
+        """Where the nominal toy would be after `horizon` decisions, the belief held fixed."""
+        key = jax.random.key(0)  # a nominal toy has no noise
+
+        def step(body, _):
+            action = self.high_level(self.toy.observe(body), belief)
+            return self.toy.step(body, action, key), None
+
+        body, _ = jax.lax.scan(step, self.toy.from_global(state), None, length=self.horizon)
+        return self.toy.observe(body)
+
+
+class OracleAgent(Agent):
+    """Told the task: its target is the subgoal. The encoder only listens."""
+
+    task: Task
+
+    def command(self, state: GlobalState, belief: Belief) -> Command:
+        return Command(jnp.zeros((*state.x.shape, 1)), Subgoal(self.task.family, self.task.target))
+
+
+class IdleAgent(Agent):
+    """Knows nothing and stands still: what a robot without inference would get."""
+
+    def command(self, state: GlobalState, belief: Belief) -> Command:
+        still = Subgoal(jnp.full(state.x.shape, VELOCITY), jnp.zeros_like(state.x))
+        return Command(jnp.zeros((*state.x.shape, 1)), still)
+
+
+def relative(subgoal: Subgoal, x: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+    """A subgoal as the robot sees it now: a goal is a point in the world, so its distance shrinks."""
+    return subgoal.value - jnp.where(subgoal.slot == GOAL, x, 0.0)

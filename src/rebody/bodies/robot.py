@@ -1,0 +1,194 @@
+"""Robots: a description each, and many of them stepped at once by MuJoCo's own batch engine.
+
+The only file that knows `mujoco.batch`.
+"""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import mujoco
+import mujoco.batch
+import numpy as np
+from jaxtyping import Bool, Float
+
+from rebody.errors import RebodyError
+from rebody.types import DECISION_DT, GlobalState
+
+Floats = Float[np.ndarray, "..."]
+
+# MuJoCo counts these and then resets the simulation by itself: its state looks healthy afterwards
+_DIVERGED = [
+    int(warning)
+    for warning in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+        mujoco.mjtWarning.mjWARN_BADCTRL,
+    )
+]
+
+
+@dataclass(frozen=True)
+class RobotSpec:
+    """A planar robot: its model, its control rate and its observation mapping (thesis 5.7)."""
+
+    name: str
+    mjcf: Path
+    frame_skip: int
+    """Simulation steps of one control step."""
+    root_joints: tuple[str, str, str]
+    """Names of the joints that carry x [m], z [m] and pitch [rad] of the root body."""
+    reset_noise: float
+    """Half-width of the uniform noise on positions and std of that on velocities at a reset."""
+    has_fallen: Callable[[Floats, Floats], Bool[np.ndarray, "..."]]
+    """(torso height above the floor [m], pitch [rad]) -> lies on the ground, at this moment."""
+    fall_duration: float
+    """Seconds that it must lie before it counts as a fall."""
+    moving_fields: tuple[str, ...] = ("x", "z", "pitch", "vx", "vz", "pitch_rate")
+    """Fields of the global state that this body can move."""
+
+    @cached_property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model."""
+        spec = mujoco.MjSpec.from_file(str(self.mjcf))
+        with warnings.catch_warnings():
+            # what MuJoCo advises instead of the cheetah's `settotalmass` changes the last bits of its physics
+            warnings.filterwarnings("ignore", message="compiler attribute 'settotalmass'")
+            return spec.compile()
+
+    @cached_property
+    def control_dt(self) -> float:
+        """Seconds of one control step."""
+        return self.frame_skip * self.model.opt.timestep
+
+    @cached_property
+    def steps_per_decision(self) -> int:
+        """Control steps of one decision; RebodyError where they do not divide it."""
+        steps = round(DECISION_DT / self.control_dt)
+        if steps < 1 or abs(steps * self.control_dt - DECISION_DT) > 1e-9:
+            raise RebodyError(
+                f"robot '{self.name}': a control step of {self.control_dt:g} s does not divide a decision "
+                f"of {DECISION_DT} s. Choose a frame_skip so that it does "
+                f"(time step {self.model.opt.timestep:g} s)."
+            )
+        return steps
+
+    @cached_property
+    def root_addresses(self) -> tuple[int, int, int]:
+        """Where x, z and pitch stand in qpos."""
+        x, z, pitch = (int(self.model.joint(name).qposadr[0]) for name in self.root_joints)
+        return x, z, pitch
+
+    @cached_property
+    def torso_height(self) -> float:
+        """Height of the root body above the floor in the rest pose [m]."""
+        x_joint = self.model.joint(self.root_joints[0])
+        return float(self.model.body_pos[self.model.jnt_bodyid[x_joint.id]][2])
+
+    def observe(self, qpos: Floats, previous_qpos: Floats) -> GlobalState:
+        """Global state from the joint positions of this decision and of the one before."""
+        x, z, pitch = (qpos[..., i].astype(np.float32) for i in self.root_addresses)
+        step = (qpos - previous_qpos) / DECISION_DT
+        vx, vz, pitch_rate = (step[..., i].astype(np.float32) for i in self.root_addresses)
+        still = np.zeros_like(x)
+        return GlobalState(
+            x=x, y=still, z=z - np.float32(self._rest_z), pitch=wrap_angle(pitch),
+            vx=vx, vy=still, vz=vz, pitch_rate=pitch_rate,
+        )  # fmt: skip
+
+    def joint_state(self, qpos: Floats, qvel: Floats) -> Float[np.ndarray, "... joint"]:
+        """What a tracker sees of the body: positions without x, pitch wrapped, velocities of like size."""
+        x, _, pitch = self.root_addresses
+        positions = qpos.astype(np.float32)
+        positions[..., pitch] = wrap_angle(positions[..., pitch])
+        velocities = (qvel * self._velocity_scale).astype(np.float32)
+        return np.concatenate([np.delete(positions, x, axis=-1), velocities], axis=-1)
+
+    @cached_property
+    def _velocity_scale(self) -> Floats:
+        # a leg's hinge turns at 10 rad/s where the trunk moves at 1 m/s
+        is_slide = self.model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
+        return np.where(is_slide, 1.0, 0.1)
+
+    def pitch(self, qpos: Floats) -> Floats:
+        """Pitch of the root body, in (-pi, pi] [rad]."""
+        return wrap_angle(qpos[..., self.root_addresses[2]])
+
+    def lies(self, qpos: Floats) -> Bool[np.ndarray, "..."]:
+        """Whether each robot lies on the ground at this moment."""
+        z = qpos[..., self.root_addresses[1]] - self._rest_z
+        return self.has_fallen(self.torso_height + z, self.pitch(qpos))
+
+    @cached_property
+    def _rest_z(self) -> float:
+        # not zero where the slide joint has a `ref` (hopper, walker: 1.25)
+        return float(self.model.qpos0[self.root_addresses[1]])
+
+
+def wrap_angle(angle: Floats) -> Floats:
+    """An angle in (-pi, pi] [rad]."""
+    return -((np.pi - angle) % (2 * np.pi) - np.pi).astype(angle.dtype)
+
+
+class RobotBatch:
+    """Many copies of one robot, stepped together; bit-identical for any number of threads."""
+
+    def __init__(self, spec: RobotSpec, size: int, threads: int = 0):
+        """`threads` = 0 uses every processor."""
+        self.spec = spec
+        self.size = size
+        self._batch = mujoco.batch.Batch(spec.model, size, threads)
+        self.qpos: Float[np.ndarray, "robot nq"] = self._batch.bind("qpos")
+        self.qvel: Float[np.ndarray, "robot nv"] = self._batch.bind("qvel")
+        self._ctrl = self._batch.bind("ctrl")
+        self.lying_s: Float[np.ndarray, " robot"] = np.zeros(size)
+        """Seconds that each robot has lain on the ground without a break."""
+
+    @property
+    def x(self) -> Float[np.ndarray, " robot"]:
+        """A copy of where each robot is [m]."""
+        return self.qpos[:, self.spec.root_addresses[0]].copy()
+
+    @property
+    def fallen(self) -> Bool[np.ndarray, " robot"]:
+        """Which robots have lain long enough to count as fallen."""
+        return self.lying_s >= self.spec.fall_duration
+
+    def reset(self, rng: np.random.Generator, robots: Bool[np.ndarray, " robot"] | None = None) -> None:
+        """Put the chosen robots (default: all) at x = 0 in the rest pose, with Gymnasium's reset noise."""
+        ids = np.arange(self.size) if robots is None else np.flatnonzero(robots)
+        if ids.size == 0:
+            return
+        self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        model, noise = self.spec.model, self.spec.reset_noise
+        qpos = model.qpos0 + rng.uniform(-noise, noise, (ids.size, model.nq))
+        qpos[:, self.spec.root_addresses[0]] = 0.0
+        self.qpos[ids] = qpos
+        self.qvel[ids] = noise * rng.standard_normal((ids.size, model.nv))
+        self.lying_s[ids] = 0.0
+
+    def step(self, actions: Float[np.ndarray, "robot nu"]) -> None:
+        """One control step with joint actions in [-1, 1]; RebodyError if a simulation diverged."""
+        low, high = self.spec.model.actuator_ctrlrange.T
+        # centre and half-width, so that an action in a range of [-1, 1] arrives without rounding
+        self._ctrl[:] = 0.5 * (low + high) + 0.5 * (high - low) * np.clip(actions, -1.0, 1.0)
+        self._batch.step(nstep=self.spec.frame_skip)
+        if self._batch.warning[:, _DIVERGED, 1].any():
+            raise RebodyError(
+                f"the simulation of '{self.spec.name}' diverged; check that its actions are finite, "
+                "or lower the model's time step."
+            )
+        self.lying_s[:] = np.where(self.spec.lies(self.qpos), self.lying_s + self.spec.control_dt, 0.0)
+
+    @property
+    def state(self) -> Float[np.ndarray, "robot state"]:
+        """A copy of mjSTATE_INTEGRATION of every robot, from which stepping continues bit-exactly."""
+        return self._batch.state.copy()
+
+    @state.setter
+    def state(self, value: Float[np.ndarray, "robot state"]) -> None:
+        self._batch.state[:] = value
+        self._batch.warning[:] = 0

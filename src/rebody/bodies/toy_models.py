@@ -1,0 +1,28 @@
+"""MuJoCo models of the toys: what their arithmetic says, as bodies that can be watched."""
+
+from pathlib import Path
+
+import mujoco
+
+from rebody.bodies.toys import MassDamper, PositionToy
+from rebody.types import DECISION_DT
+
+_MODELS = Path(__file__).parent / "models"
+
+
+def mass_damper_model(toy: MassDamper) -> mujoco.MjModel:
+    """A model whose time step is one decision of this toy; its control is the toy's action."""
+    spec = mujoco.MjSpec.from_file(str(_MODELS / "mass_damper.xml"))
+    spec.geom("mass").mass = toy.mass
+    spec.joint("x").damping[0] = toy.damping
+    spec.actuator("force").gear[0] = toy.max_force
+    return spec.compile()
+
+
+def position_toy_model(toy: PositionToy) -> mujoco.MjModel:
+    """A model whose time step is one decision of this toy; its control is the toy's action."""
+    spec = mujoco.MjSpec.from_file(str(_MODELS / "position_toy.xml"))
+    step = spec.actuator("step")
+    servo_gain = -step.biasprm[2]
+    step.gainprm[0] = servo_gain * toy.max_step / DECISION_DT
+    return spec.compile()

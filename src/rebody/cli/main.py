@@ -1,0 +1,71 @@
+"""`rebody`: reads the command, runs it, and turns errors into one clear message."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+
+from rebody.errors import RebodyError
+
+
+def main() -> None:
+    """Entry point; exit code 2 for errors that the user can mend, 130 after Ctrl-C."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command line; returns its exit code."""
+    _prepare_environment()
+    from rebody.training.run import Interrupted
+
+    try:
+        command = parse(arguments)
+        command.run()
+    except RebodyError as error:
+        Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {_plain(error)}", highlight=False)
+        return 2
+    except Interrupted as interruption:
+        Console(stderr=True, soft_wrap=True).print(_plain(interruption), highlight=False)
+        return 130
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def parse(arguments: list[str]):
+    """The command with its options; prints help or usage and exits where tyro does."""
+    from rebody.cli.demo import Demo
+    from rebody.cli.evaluate import Evaluate
+    from rebody.cli.listing import List
+    from rebody.cli.run import RunTask
+    from rebody.cli.train import train_inference_default, TrainInference, TrainTracker
+
+    commands = (
+        Annotated[Demo, tyro.conf.subcommand("demo")]
+        | Annotated[RunTask, tyro.conf.subcommand("run")]
+        | Annotated[List, tyro.conf.subcommand("list")]
+        | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    )
+    if arguments[:1] == ["train"]:
+        commands = (
+            Annotated[
+                TrainInference, tyro.conf.subcommand("inference", default=train_inference_default(arguments))
+            ]
+            | Annotated[TrainTracker, tyro.conf.subcommand("tracker")]
+        )
+        return tyro.cli(commands, prog="rebody train", args=arguments[1:])
+    return tyro.cli(commands, prog="rebody", args=arguments)
+
+
+def _plain(message: object) -> str:
+    return str(message).replace("[", r"\[")
+
+
+def _prepare_environment() -> None:
+    """Before JAX is imported: compile once per machine."""
+    cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "rebody" / "jax"
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")

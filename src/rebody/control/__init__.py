@@ -1,0 +1,1 @@
+"""Policies: soft actor-critic, and the tracker that turns subgoals into joint actions."""

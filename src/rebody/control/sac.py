@@ -1,0 +1,238 @@
+"""Soft actor-critic (thesis 2.14-2.17; Haarnoja et al. 2018), one implementation for every policy.
+
+State in, state out: `update(state, batch, key, config) -> (state, metrics)`. Twin critics with
+layer normalisation, a learned temperature, and a slowly averaged actor for evaluation.
+"""
+
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import optax
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from rebody.nn import MLP, MultiScale
+from rebody.types import Tree
+
+LOG_STD_RANGE = (-5.0, 1.0)
+
+
+@dataclass(frozen=True)
+class SACConfig:
+    """Hyperparameters of soft actor-critic."""
+
+    hidden: tuple[int, ...] = (256, 256)
+    """Units of each hidden layer of actor and critics."""
+    projections: int = 0
+    """Learned differences of the inputs that the networks see at several sharpnesses; 0 for none."""
+    learning_rate: float = 3e-4
+    """Adam's step size for actor and critics at the start."""
+    final_learning_rate: float = 3e-5
+    """Step size that a cosine reaches after `decay_updates`: small steps make precise policies."""
+    decay_updates: int = 100_000
+    """Updates over which the step size falls."""
+    discount: float = 0.98
+    """Discount per step."""
+    target_rate: float = 0.005
+    """Share of the new critic in the target critic at each update (tau)."""
+    average_rate: float = 0.002
+    """Share of the new actor in the averaged one."""
+    target_entropy: float = -1.0
+    """Wanted entropy [nats] per action dimension, of the action before its bounds are scaled."""
+    initial_temperature: float = 0.1
+    """Temperature alpha at the start; learned from there."""
+    batch_size: int = 256
+    """Transitions of one update."""
+    huber: float = 100.0
+    """Bellman errors beyond this count linearly. Where a hidden task makes early values uncertain by metres,
+    it keeps them from drowning the centimetres."""
+
+
+class SACBatch(eqx.Module):
+    """Transitions; `terminal` is 1 where the episode truly ended (no value beyond)."""
+
+    observation: Float[Array, "batch observation"]
+    action: Float[Array, "batch action"]  # in [-1, 1]
+    reward: Float[Array, " batch"]
+    next_observation: Float[Array, "batch observation"]
+    terminal: Float[Array, " batch"]
+
+
+class Network(eqx.Module):
+    """An MLP, behind a multi-scale input layer where wanted."""
+
+    multi_scale: MultiScale | None
+    mlp: MLP
+
+    def __init__(self, inputs: int, outputs: int, config: SACConfig, *, key: PRNGKeyArray, **mlp_options):
+        scale_key, mlp_key = jax.random.split(key)
+        self.multi_scale = MultiScale(inputs, config.projections, key=scale_key) if config.projections else None
+        seen = self.multi_scale.outputs if self.multi_scale else inputs
+        self.mlp = MLP(seen, outputs, config.hidden, key=mlp_key, **mlp_options)
+
+    def __call__(self, x: Float[Array, "*batch inputs"]) -> Float[Array, "*batch outputs"]:
+        return self.mlp(x if self.multi_scale is None else self.multi_scale(x))
+
+
+class Actor(eqx.Module):
+    """A tanh-squashed Gaussian policy: observation -> action in [-1, 1]."""
+
+    net: Network
+    observations: int = eqx.field(static=True)
+    actions: int = eqx.field(static=True)
+
+    def __init__(self, observations: int, actions: int, config: SACConfig, key: PRNGKeyArray):
+        self.observations, self.actions = observations, actions
+        self.net = Network(observations, 2 * actions, config, key=key, last_scale=0.1)
+
+    def __call__(self, observation: Float[Array, "*batch observation"]) -> Float[Array, "*batch action"]:
+        """The most likely action."""
+        return jnp.tanh(self._gaussian(observation)[0])
+
+    def sample(
+        self, observation: Float[Array, "*batch observation"], key: PRNGKeyArray
+    ) -> tuple[Float[Array, "*batch action"], Float[Array, "*batch"]]:
+        """An action and its log-probability density [nats]."""
+        mean, log_std = self._gaussian(observation)
+        noise = jax.random.normal(key, mean.shape)
+        raw = mean + jnp.exp(log_std) * noise
+        gaussian = -0.5 * noise**2 - log_std - 0.5 * jnp.log(2 * jnp.pi)
+        # ln(1 - tanh(u)^2), written so that it does not overflow
+        squash = 2 * (jnp.log(2.0) - raw - jax.nn.softplus(-2 * raw))
+        return jnp.tanh(raw), jnp.sum(gaussian - squash, axis=-1)
+
+    def _gaussian(self, observation):
+        mean, log_std = jnp.split(self.net(observation), 2, axis=-1)
+        low, high = LOG_STD_RANGE
+        return mean, low + 0.5 * (high - low) * (jnp.tanh(log_std) + 1)
+
+
+class Critics(eqx.Module):
+    """Two critics: (observation, action) -> value, stacked on the first axis."""
+
+    first: Network
+    second: Network
+
+    def __init__(self, inputs: int, config: SACConfig, key: PRNGKeyArray):
+        first_key, second_key = jax.random.split(key)
+        self.first = Network(inputs, 1, config, key=first_key, layer_norm=True)
+        self.second = Network(inputs, 1, config, key=second_key, layer_norm=True)
+
+    def __call__(
+        self, observation: Float[Array, "*batch observation"], action: Float[Array, "*batch action"]
+    ) -> Float[Array, "2 *batch"]:
+        """The value that each critic gives."""
+        x = jnp.concatenate([observation, action], axis=-1)
+        return jnp.stack([self.first(x)[..., 0], self.second(x)[..., 0]])
+
+
+class SACState(eqx.Module):
+    """Everything an update reads and writes."""
+
+    actor: Actor
+    averaged_actor: Actor
+    critics: Critics
+    target_critics: Critics
+    log_temperature: Float[Array, ""]
+    actor_optimiser: optax.OptState
+    critic_optimiser: optax.OptState
+    temperature_optimiser: optax.OptState
+
+
+def initial_state(observations: int, actions: int, config: SACConfig, key: PRNGKeyArray) -> SACState:
+    """A fresh policy for observation and action vectors of the given sizes."""
+    actor_key, critic_key = jax.random.split(key)
+    actor = Actor(observations, actions, config, actor_key)
+    critics = Critics(observations + actions, config, critic_key)
+    log_temperature = jnp.log(jnp.asarray(config.initial_temperature, jnp.float32))
+    optimiser = _optimiser(config)
+    return SACState(
+        actor=actor,
+        averaged_actor=actor,
+        critics=critics,
+        target_critics=critics,
+        log_temperature=log_temperature,
+        actor_optimiser=optimiser.init(eqx.filter(actor, eqx.is_array)),
+        critic_optimiser=optimiser.init(eqx.filter(critics, eqx.is_array)),
+        temperature_optimiser=optimiser.init(log_temperature),
+    )
+
+
+def update(
+    state: SACState, batch: SACBatch, key: PRNGKeyArray, config: SACConfig
+) -> tuple[SACState, dict[str, Float[Array, ""]]]:
+    """One step of critics, actor and temperature, then of the two moving averages."""
+    critic_key, actor_key = jax.random.split(key)
+    state, critic_metrics = _update_critics(state, batch, critic_key, config)
+    state, actor_metrics = _update_actor(state, batch, actor_key, config)
+    state, temperature_metrics = _update_temperature(state, actor_metrics["entropy"], batch, config)
+    state = _update_averages(state, config)
+    return state, critic_metrics | actor_metrics | temperature_metrics
+
+
+def _update_critics(state, batch, key, config):
+    """Soft Bellman error against the smaller of the two target critics (thesis 2.14, 2.15)."""
+    next_action, next_log_prob = state.actor.sample(batch.next_observation, key)
+    next_value = state.target_critics(batch.next_observation, next_action).min(0)
+    next_value = next_value - jnp.exp(state.log_temperature) * next_log_prob
+    target = batch.reward + config.discount * (1 - batch.terminal) * next_value
+
+    def loss(critics):
+        values = critics(batch.observation, batch.action)
+        return 2 * jnp.mean(optax.huber_loss(values, target[None], delta=config.huber)), values
+
+    (value, values), gradient = eqx.filter_value_and_grad(loss, has_aux=True)(state.critics)
+    critics, optimiser = _apply(gradient, state.critics, state.critic_optimiser, config)
+    state = eqx.tree_at(lambda s: (s.critics, s.critic_optimiser), state, (critics, optimiser))
+    return state, {"critic_loss": value, "value": values.mean()}
+
+
+def _update_actor(state, batch, key, config):
+    """KL between the policy and the softmax of the critics (thesis 2.16, 2.17)."""
+
+    def loss(actor):
+        action, log_prob = actor.sample(batch.observation, key)
+        value = state.critics(batch.observation, action).min(0)
+        return jnp.mean(jnp.exp(state.log_temperature) * log_prob - value), -log_prob.mean()
+
+    (value, entropy), gradient = eqx.filter_value_and_grad(loss, has_aux=True)(state.actor)
+    actor, optimiser = _apply(gradient, state.actor, state.actor_optimiser, config)
+    state = eqx.tree_at(lambda s: (s.actor, s.actor_optimiser), state, (actor, optimiser))
+    return state, {"actor_loss": value, "entropy": entropy}
+
+
+def _update_temperature(state, entropy, batch, config):
+    """Raise alpha while the entropy is below its target, lower it above."""
+    gradient = entropy - config.target_entropy * batch.action.shape[-1]
+    log_temperature, optimiser = _apply(gradient, state.log_temperature, state.temperature_optimiser, config)
+    state = eqx.tree_at(
+        lambda s: (s.log_temperature, s.temperature_optimiser), state, (log_temperature, optimiser)
+    )
+    return state, {"temperature": jnp.exp(log_temperature)}
+
+
+def _update_averages(state, config):
+    target_critics = _average(state.target_critics, state.critics, config.target_rate)
+    averaged_actor = _average(state.averaged_actor, state.actor, config.average_rate)
+    return eqx.tree_at(
+        lambda s: (s.target_critics, s.averaged_actor), state, (target_critics, averaged_actor)
+    )
+
+
+def _average(old: Tree, new: Tree, rate: float) -> Tree:
+    return jax.tree.map(lambda a, b: a + rate * (b - a), old, new)
+
+
+def _optimiser(config: SACConfig) -> optax.GradientTransformation:
+    schedule = optax.cosine_decay_schedule(
+        config.learning_rate,
+        config.decay_updates,
+        alpha=config.final_learning_rate / config.learning_rate,
+    )
+    return optax.adam(schedule)
+
+
+def _apply(gradient, parameters, optimiser, config):
+    updates, optimiser = _optimiser(config).update(gradient, optimiser)
+    return eqx.apply_updates(parameters, updates), optimiser

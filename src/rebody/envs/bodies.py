@@ -1,0 +1,138 @@
+"""What an environment needs of bodies: any number of copies that reset one by one and step together."""
+
+from abc import ABC, abstractmethod
+
+import equinox as eqx
+import jax
+import mujoco
+import numpy as np
+from jaxtyping import Array, Float
+
+from rebody.bodies import RobotBatch, RobotSpec
+from rebody.bodies.toy_models import mass_damper_model
+from rebody.bodies.toys import MassDamper
+from rebody.types import GlobalState
+
+
+class Bodies(ABC):
+    """Copies of one body."""
+
+    size: int
+    actions: int
+    """Numbers in the action of one body, each in [-1, 1]."""
+
+    @property
+    @abstractmethod
+    def model(self) -> mujoco.MjModel:
+        """What a camera draws."""
+
+    @property
+    @abstractmethod
+    def qpos(self) -> Float[np.ndarray, "body nq"]:
+        """A copy of the joint positions [m, rad]."""
+
+    @property
+    @abstractmethod
+    def qvel(self) -> Float[np.ndarray, "body nv"]:
+        """A copy of the joint velocities [m/s, rad/s]."""
+
+    @abstractmethod
+    def reset(self, body: int, rng: np.random.Generator) -> None:
+        """Put one body at x = 0."""
+
+    @abstractmethod
+    def step(self, actions: Float[np.ndarray, "body action"]) -> None:
+        """One step of every body."""
+
+    @abstractmethod
+    def global_state(self) -> GlobalState:
+        """The body-neutral readout; velocities are means over the last 0.1 s."""
+
+
+class PointMasses(Bodies):
+    """Nominal mass-dampers, at rest after a reset. A step is a decision of 0.1 s."""
+
+    actions = 1
+
+    def __init__(self, size: int):
+        self.size = size
+        self._toy = MassDamper()
+        self._x = np.zeros(size, np.float32)
+        self._vx = np.zeros(size, np.float32)
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The toy's MuJoCo model."""
+        return mass_damper_model(self._toy)
+
+    @property
+    def qpos(self) -> Float[np.ndarray, "body 1"]:
+        """x [m]."""
+        return self._x[:, None].astype(np.float64)
+
+    @property
+    def qvel(self) -> Float[np.ndarray, "body 1"]:
+        """vx [m/s]."""
+        return self._vx[:, None].astype(np.float64)
+
+    def reset(self, body: int, rng: np.random.Generator) -> None:
+        """Put one point mass at rest at x = 0."""
+        self._x[body] = self._vx[body] = 0.0
+
+    def step(self, actions: Float[np.ndarray, "body 1"]) -> None:
+        """One decision of every point mass."""
+        x, vx = _advance(self._toy, self._x, self._vx, actions.astype(np.float32))
+        self._x, self._vx = np.array(x), np.array(vx)
+
+    def global_state(self) -> GlobalState:
+        """The readout of every point mass."""
+        still = np.zeros_like(self._x)
+        return GlobalState(self._x, still, still, still, self._vx, still, still, still)
+
+
+@eqx.filter_jit
+def _advance(toy, x, vx, actions) -> tuple[Float[Array, " body"], Float[Array, " body"]]:
+    # a nominal toy has no noise, so its key does not matter
+    state = toy.step(toy.initial(x, vx), actions, jax.random.key(0))
+    return state.x, state.vx
+
+
+class Robots(Bodies):
+    """Copies of one robot. A step is a control step."""
+
+    def __init__(self, spec: RobotSpec, size: int, threads: int = 0):
+        """`threads` = 0 uses every processor."""
+        self.size = size
+        self.actions = spec.model.nu
+        self._spec = spec
+        self._batch = RobotBatch(spec, size, threads)
+        self._past_qpos = np.zeros((spec.steps_per_decision + 1, size, spec.model.nq))
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The robot's own model."""
+        return self._spec.model
+
+    @property
+    def qpos(self) -> Float[np.ndarray, "body nq"]:
+        """Joint positions, x among them [m, rad]."""
+        return self._batch.qpos.copy()
+
+    @property
+    def qvel(self) -> Float[np.ndarray, "body nv"]:
+        """Joint velocities [m/s, rad/s]."""
+        return self._batch.qvel.copy()
+
+    def reset(self, body: int, rng: np.random.Generator) -> None:
+        """Put one robot at x = 0 in its rest pose, with its reset noise."""
+        self._batch.reset(rng, np.arange(self.size) == body)
+        self._past_qpos[:, body] = self._batch.qpos[body]
+
+    def step(self, actions: Float[np.ndarray, "body action"]) -> None:
+        """One control step of every robot."""
+        self._batch.step(actions)
+        self._past_qpos = np.concatenate([self._past_qpos[1:], self._batch.qpos[None]])
+
+    def global_state(self) -> GlobalState:
+        """The readout of every robot; before its first step each counts as having stood still."""
+        return self._spec.observe(self._past_qpos[-1], self._past_qpos[0])

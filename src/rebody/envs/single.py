@@ -1,0 +1,52 @@
+"""One body with a hidden task: a world of one."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from rebody.envs.bodies import Bodies
+from rebody.envs.world import DEFAULT_BASE_TASKS, World
+from rebody.tasks import BaseTask
+
+
+class TaskEnv(gymnasium.Env):
+    """Never terminates; the task is in `info`, not in the observation."""
+
+    def __init__(
+        self,
+        bodies: Bodies,
+        *,
+        base_tasks: Sequence[BaseTask] = DEFAULT_BASE_TASKS,
+        reward: str = "plain",
+        render_mode: str | None = None,
+    ):
+        """Tasks are drawn from `base_tasks` unless `reset` is told one; `reward` is "plain" or "relative"."""
+        self._world = World(bodies, base_tasks, reward)
+        self.render_mode = render_mode
+        self.observation_space = self._world.observation_space
+        self.action_space = self._world.action_space
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+        """Start anew; `options` may name the task: {"family": "goal", "target": -3.0}."""
+        super().reset(seed=seed)
+        self._world.reset(0, self.np_random, options)
+        return self._world.observations()[0], self._info()
+
+    def step(self, action: np.ndarray):
+        """One step with an action in [-1, 1]; larger ones are clipped."""
+        self._world.bodies.step(np.asarray(action, np.float64)[None])
+        reward = float(self._world.rewards()[0])
+        return self._world.observations()[0], reward, False, False, self._info()
+
+    def render(self) -> np.ndarray | None:
+        """A picture from a camera that follows the body, where `render_mode` is "rgb_array"."""
+        return self._world.pictures()[0] if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Release the camera; may be called twice."""
+        self._world.close()
+
+    def _info(self) -> dict[str, Any]:
+        return {name: values.tolist()[0] for name, values in self._world.info().items()}

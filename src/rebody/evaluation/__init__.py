@@ -1,0 +1,7 @@
+"""Agents judged on hidden tasks."""
+
+from rebody.evaluation.evaluate import evaluate
+from rebody.evaluation.results import Results, save_results
+from rebody.evaluation.tables import summary_table
+
+__all__ = ["Results", "evaluate", "save_results", "summary_table"]

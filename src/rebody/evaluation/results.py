@@ -1,0 +1,161 @@
+"""What an evaluation leaves behind: the versioned JSON that others read."""
+
+import json
+import os
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float, Int
+
+from rebody.agents.rollout import Episodes
+from rebody.tasks.figures import final_error, final_squared_error, ripple
+from rebody.evaluation.summary import summarise
+from rebody.tasks import FAMILIES
+from rebody.tasks.task_file import TaskSpec
+from rebody.types import DECISION_DT, AnyArray, Task
+
+VERSION = 1
+JUMP_WINDOW_S = 1.0
+"""The largest vz is taken over this many seconds."""
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """One episode; entry i of a list is the state after decision i, its belief includes decision i."""
+
+    family: str
+    target: float
+    seed: int
+    switch: dict[str, Any] | None
+    time_s: list[float]
+    position_m: list[float]
+    velocity_m_s: list[float]
+    pitch_rad: list[float]
+    vz_max_m_s: list[float]
+    reward: list[float]
+    active_family: list[str]
+    active_target: list[float]
+    inferred_family: list[str]
+    inferred_target: list[float]
+    cluster: list[int]
+    latent: list[list[float]]
+    subgoal_family: list[str]
+    subgoal: list[float]
+    fell: bool
+    return_: float
+    oracle_return: float | None
+    final_error: float
+    final_squared_error: float
+    ripple_m_s: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Under the names of the file format."""
+        entry = asdict(self)
+        entry["return"] = entry.pop("return_")
+        if self.switch is None:
+            del entry["switch"]
+        return entry
+
+
+@dataclass(frozen=True)
+class Results:
+    """One evaluation."""
+
+    robot: str
+    agent: str
+    inference: str
+    tracker: str | None
+    control_dt: float
+    stride: int
+    horizon: int
+    episodes: list[EpisodeResult]
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Statistics per family, with 95 % bootstrap intervals."""
+        return summarise(self.episodes)
+
+    def to_json(self) -> dict[str, Any]:
+        """The whole file."""
+        head = {name: value for name, value in asdict_shallow(self).items() if name != "episodes"}
+        return {
+            "version": VERSION,
+            **head,
+            "decision_dt": DECISION_DT,
+            "episodes": [episode.to_json() for episode in self.episodes],
+            "summary": self.summary,
+        }
+
+
+def asdict_shallow(results: Results) -> dict[str, Any]:
+    """Fields of a dataclass without descending into them."""
+    return {name: getattr(results, name) for name in results.__dataclass_fields__}
+
+
+def save_results(results: Results, path: Path) -> None:
+    """Write the JSON, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f".{path.name}.new")
+    unfinished.write_text(json.dumps(results.to_json(), allow_nan=False))
+    os.replace(unfinished, path)
+
+
+def episode_results(
+    specs: list[TaskSpec],
+    seeds: Int[np.ndarray, " episode"],
+    tasks: Task,
+    episodes: Episodes,
+    read: tuple[Int[AnyArray, "time episode"], Float[AnyArray, "time episode"]],
+    oracle_returns: Float[np.ndarray, " episode"] | None,
+) -> list[EpisodeResult]:
+    """One result per episode, from arrays [time, episode]; `read` is what the probe says."""
+    names = np.array([family.name for family in FAMILIES])
+    inferred_family, inferred_target = (np.asarray(part) for part in read)
+    state = episodes.state
+    results = []
+    for i, spec in enumerate(specs):
+        position, velocity = np.asarray(state.x[:, i], float), np.asarray(state.vx[:, i], float)
+        family, target = spec.last.family, spec.last.target
+        results.append(
+            EpisodeResult(
+                family=spec.family,
+                target=spec.target,
+                seed=int(seeds[i]),
+                switch=None if spec.switch is None else asdict(spec.switch),
+                time_s=_floats(DECISION_DT * np.arange(1, len(position) + 1)),
+                position_m=_floats(position),
+                velocity_m_s=_floats(velocity),
+                pitch_rad=_floats(state.pitch[:, i]),
+                vz_max_m_s=_floats(_running_max(np.asarray(state.vz[:, i], float))),
+                reward=_floats(episodes.reward[:, i]),
+                active_family=names[np.asarray(tasks.family[:, i])].tolist(),
+                active_target=_floats(tasks.target[:, i]),
+                inferred_family=names[inferred_family[:, i]].tolist(),
+                inferred_target=_floats(inferred_target[:, i]),
+                cluster=[0] * len(position),  # a single Gaussian prior has one
+                latent=[_floats(row) for row in episodes.belief.mean[:, i]],
+                subgoal_family=names[np.asarray(episodes.subgoal.slot[:, i])].tolist(),
+                subgoal=_floats(episodes.subgoal.value[:, i]),
+                fell=bool(episodes.fell[i]),
+                return_=float(np.sum(episodes.reward[:, i])),
+                oracle_return=None if oracle_returns is None else float(oracle_returns[i]),
+                final_error=final_error(family, target, position),
+                final_squared_error=final_squared_error(family, target, position, velocity),
+                ripple_m_s=ripple(position, velocity),
+            )
+        )
+    return results
+
+
+def _running_max(vz: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
+    steps = round(JUMP_WINDOW_S / DECISION_DT)
+    padded = np.concatenate([np.full(steps - 1, -np.inf), vz])
+    return np.lib.stride_tricks.sliding_window_view(padded, steps).max(axis=-1)
+
+
+def _floats(values: Any) -> list[float]:
+    """As JSON holds them: five decimals are 10 micrometres."""
+    return [round(float(value), 5) for value in np.asarray(values)]

@@ -1,0 +1,59 @@
+"""What an inference module expects of a body before it may be attached to it."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rebody.errors import RebodyError
+from rebody.tasks import RewardForm, family_index
+from rebody.types import DECISION_DT
+
+CONTRACT_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Contract:
+    """Inputs, time and tasks of an inference module; stored with it and checked when it is attached."""
+
+    fields: tuple[str, ...]
+    """Fields of the global state that the encoder sees (m, m/s, rad, rad/s)."""
+    window: int
+    """Decisions that a belief rests on."""
+    target_ranges: dict[str, tuple[float, float]]
+    """Smallest and largest target per family."""
+    reward: RewardForm
+    """Form of the reward that the encoder hears."""
+    decision_dt: float = DECISION_DT
+    """Seconds between two transitions."""
+    version: int = CONTRACT_VERSION
+
+    @property
+    def families(self) -> tuple[int, ...]:
+        """Indices of the families that the module can tell apart, ascending."""
+        return tuple(sorted(family_index(name) for name in self.target_ranges))
+
+    def check_body(self, name: str, moving_fields: tuple[str, ...], slots: tuple[str, ...]) -> None:
+        """RebodyError with all that does not fit a body that moves these fields and follows these slots."""
+        problems = []
+        if self.decision_dt != DECISION_DT:
+            problems.append(f"it expects a decision every {self.decision_dt:g} s, here one takes {DECISION_DT} s")
+        if missing := [field for field in self.fields if field not in moving_fields]:
+            problems.append(f"its encoder sees {', '.join(missing)}, which '{name}' does not have")
+        if missing := [family for family in self.target_ranges if family not in slots]:
+            problems.append(f"the tracker has no slot for {', '.join(missing)} (it has {', '.join(slots)})")
+        if problems:
+            raise RebodyError(f"the inference module does not fit '{name}': {'; '.join(problems)}.")
+
+    def to_config(self) -> dict[str, Any]:
+        """For config.json."""
+        return asdict(self)
+
+    @classmethod
+    def from_config(cls, config: dict[str, Any]) -> "Contract":
+        """From config.json; RebodyError for a version that this release cannot read."""
+        if config.get("version") != CONTRACT_VERSION:
+            raise RebodyError(
+                f"the module's contract has version {config.get('version')}, this release reads "
+                f"{CONTRACT_VERSION}. Train the module again, or install the release that made it."
+            )
+        ranges = {name: (low, high) for name, (low, high) in config["target_ranges"].items()}
+        return cls(**{**config, "fields": tuple(config["fields"]), "target_ranges": ranges})

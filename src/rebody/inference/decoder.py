@@ -1,0 +1,59 @@
+"""The decoder: (state, action, latent) -> (next state, reward), used in training only."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from rebody.nn import MLP
+
+
+class Gaussian(eqx.Module):
+    """Mean and log-variance of a prediction."""
+
+    mean: Float[Array, "*batch"]
+    log_variance: Float[Array, "*batch"]
+
+
+class Decoder(eqx.Module):
+    """p(next state, reward | state, action, z) = p(next state | state, action, z) p(reward | next state, z).
+
+    The chain rule lets the reward head see the next state itself, which a gait or a noise may have moved
+    away from its prediction. The state head sees z but does not shape it: dynamics must not get into a
+    latent that is to be reused on other bodies (thesis chapter 4).
+
+    The reward is a weighted distance from a point that is linear in z: all that tasks of the kind "bring this
+    to there" need. So targets lie along straight lines of the latent and read out sharply, where an MLP in
+    this place curls them up.
+    """
+
+    state_head: MLP
+    reference: MLP
+    weights: MLP
+    log_variance: MLP
+
+    def __init__(self, fields: int, actions: int, latent: int, units: int, *, key: PRNGKeyArray):
+        keys = jax.random.split(key, 4)
+        self.state_head = MLP(fields + actions + latent, fields, (units, units), key=keys[0])
+        self.reference = MLP(latent, fields, (), key=keys[1])
+        self.weights = MLP(latent, fields, (units,), key=keys[2])
+        self.log_variance = MLP(fields + latent, 1, (units, units), key=keys[3])
+
+    def next_state(
+        self,
+        state: Float[Array, "*batch field"],
+        action: Float[Array, "*batch action"],
+        latent: Float[Array, "*batch latent"],
+    ) -> Float[Array, "*batch field"]:
+        """Predicted fields of the next state, scaled as the encoder's."""
+        inputs = jnp.concatenate([state, action, jax.lax.stop_gradient(latent)], axis=-1)
+        return state + self.state_head(inputs)
+
+    def reward(
+        self, next_state: Float[Array, "*batch field"], latent: Float[Array, "*batch latent"]
+    ) -> Gaussian:
+        """Predicted reward, in units of the reward scale, and how sure the decoder is of it."""
+        distance = jnp.abs(next_state - self.reference(latent))
+        mean = -jnp.sum(jax.nn.softplus(self.weights(latent)) * distance, axis=-1)
+        log_variance = self.log_variance(jnp.concatenate([next_state, latent], axis=-1))[..., 0]
+        return Gaussian(mean, jnp.clip(log_variance, -12.0, 4.0))

@@ -1,0 +1,123 @@
+"""The encoder: a belief about the task from the last W transitions (thesis 5.3.3)."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, PRNGKeyArray
+
+from rebody.nn import GRU, MLP
+from rebody.types import DECISION_DT, Belief, Transition
+
+VARIANCE_RANGE = (1e-6, 4.0)
+
+
+class EncoderCarry(eqx.Module):
+    """W recurrent states, each begun one decision after the other.
+
+    The oldest has seen exactly the last W transitions, so a belief over a sliding window costs one
+    batched cell step a decision, and no window has to be stored.
+    """
+
+    hidden: Float[Array, "*batch window units"]
+    last: Float[Array, "*batch feature"]  # features of the newest transition
+    ticks: Int[Array, ""]
+
+
+class Encoder(eqx.Module):
+    """GRU over a window of (state, reward, next state): no action ever enters."""
+
+    embed: MLP
+    cell: GRU
+    head: MLP
+    gate: MLP
+    fields: tuple[str, ...] = eqx.field(static=True)
+    scales: tuple[float, ...] = eqx.field(static=True)
+    reward_scale: float = eqx.field(static=True)
+    window: int = eqx.field(static=True)
+    latent: int = eqx.field(static=True)
+
+    def __init__(
+        self,
+        *,
+        fields: tuple[str, ...],
+        scales: tuple[float, ...],
+        reward_scale: float,
+        window: int,
+        latent: int,
+        units: int,
+        key: PRNGKeyArray,
+    ):
+        """`scales` divide the fields (m, rad, m/s), `reward_scale` the reward: all near 1 afterwards."""
+        keys = jax.random.split(key, 4)
+        inputs = 2 * len(fields) + 2
+        self.embed = MLP(2 * inputs, units, (units,), key=keys[0])
+        self.cell = GRU(units, units, key=keys[1])
+        self.head = MLP(units + inputs, 2 * latent, (2 * units, 2 * units), key=keys[2])
+        self.gate = MLP(units, latent * inputs, (units,), key=keys[3], last_scale=0.1)
+        self.fields, self.scales, self.reward_scale = fields, scales, reward_scale
+        self.window, self.latent = window, latent
+
+    def initial(self, shape: tuple[int, ...] = ()) -> EncoderCarry:
+        """Nothing seen yet."""
+        return EncoderCarry(
+            jnp.zeros((*shape, self.window, self.cell.units)),
+            jnp.zeros((*shape, 2 * len(self.fields) + 2)),
+            jnp.zeros((), jnp.int32),
+        )
+
+    def prior(self, shape: tuple[int, ...] = ()) -> Belief:
+        """The belief before the first transition: a unit Gaussian."""
+        return Belief(jnp.zeros((*shape, self.latent)), jnp.ones((*shape, self.latent)))
+
+    def step(self, carry: EncoderCarry, transition: Transition) -> tuple[EncoderCarry, Belief]:
+        """One decision: take in a transition, say what is believed now."""
+        features = self.features(transition)
+        begins = carry.ticks % self.window
+        is_new = (jnp.arange(self.window) == begins)[:, None]
+        inputs = jnp.where(
+            is_new,
+            self._embed(features, features)[..., None, :],
+            self._embed(features, carry.last)[..., None, :],
+        )
+        hidden = self.cell(jnp.where(is_new, 0.0, carry.hidden), inputs)
+        oldest = jnp.where(carry.ticks < self.window, 0, (carry.ticks + 1) % self.window)
+        belief = self.belief(jnp.take(hidden, oldest, axis=-2), features)
+        return EncoderCarry(hidden, features, carry.ticks + 1), belief
+
+    def along(self, transitions: Transition) -> Belief:
+        """Beliefs after each of up to W transitions on the last axis, nothing known before the first.
+
+        Shapes: transitions [*batch, time], belief [*batch, time, latent].
+        """
+        features = self.features(transitions)
+        last = jnp.concatenate([features[..., :1, :], features[..., :-1, :]], axis=-2)
+        inputs = jnp.moveaxis(self._embed(features, last), -2, 0)
+
+        def step(hidden, embedded):
+            hidden = self.cell(hidden, embedded)
+            return hidden, hidden
+
+        start = jnp.zeros((*inputs.shape[1:-1], self.cell.units))
+        _, hidden = jax.lax.scan(step, start, inputs)
+        return self.belief(jnp.moveaxis(hidden, 0, -2), features)
+
+    def _embed(self, features: Float[Array, "*batch feature"], last: Float[Array, "*batch feature"]):
+        """Features and their change since the transition before: does the reward rise or fall?"""
+        return self.embed(jnp.concatenate([features, (features - last) / DECISION_DT], axis=-1))
+
+    def features(self, transition: Transition) -> Float[Array, "*batch feature"]:
+        """Where it is, how it moved, and the reward, once more compressed so that small ones show."""
+        scales = jnp.asarray(self.scales)
+        state = transition.state.select(self.fields) / scales
+        change = (state - transition.previous.select(self.fields) / scales) / DECISION_DT
+        reward = transition.reward / self.reward_scale
+        rewards = jnp.stack([reward, 0.3 * jnp.arcsinh(50 * reward)], axis=-1)
+        return jnp.concatenate([state, change, rewards], axis=-1)
+
+    def belief(self, hidden: Float[Array, "*batch units"], features: Float[Array, "*batch feature"]) -> Belief:
+        """Read a belief from a recurrent state and the newest transition's features."""
+        mean, raw = jnp.split(self.head(jnp.concatenate([hidden, features], axis=-1)), 2, axis=-1)
+        gates = self.gate(hidden).reshape(*hidden.shape[:-1], self.latent, features.shape[-1])
+        mean = mean + jnp.einsum("...lf,...f->...l", gates, features)
+        low, high = VARIANCE_RANGE
+        return Belief(mean, jnp.exp(jnp.clip(raw - 2.0, jnp.log(low), jnp.log(high))))

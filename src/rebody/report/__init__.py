@@ -1,0 +1,6 @@
+"""Figures and videos of evaluations."""
+
+from rebody.report.figures import plot_episode, plot_transfer
+from rebody.report.video import film
+
+__all__ = ["film", "plot_episode", "plot_transfer"]

@@ -1,0 +1,17 @@
+"""Files that last: artifacts (trained parts, shared) and checkpoints (runs, continued)."""
+
+from rebody.store.artifact import Artifact, load_artifact, save_artifact, shipped_artifacts
+from rebody.store.checkpoint import load_checkpoint, save_checkpoint
+from rebody.store.trees import arrays_into_tree, tree_hash, tree_to_arrays
+
+__all__ = [
+    "Artifact",
+    "arrays_into_tree",
+    "load_artifact",
+    "load_checkpoint",
+    "save_artifact",
+    "save_checkpoint",
+    "shipped_artifacts",
+    "tree_hash",
+    "tree_to_arrays",
+]

@@ -1,0 +1,80 @@
+"""Checkpoints: the whole state of one run in one file, so that a killed run continues where it was.
+
+Everything is in one safetensors file, since one rename is the only change that a crash cannot split.
+A hash over meta data and arrays lies in its header: a flipped byte often loads without a word.
+"""
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import safetensors.numpy
+from safetensors import SafetensorError, safe_open
+
+from rebody.errors import RebodyError
+from rebody.store.files import sync
+from rebody.store.trees import arrays_into_tree, tree_hash, tree_to_arrays
+from rebody.types import Tree
+
+FORMAT_VERSION = "1"
+FILE = "checkpoint.safetensors"
+
+
+def save_checkpoint(folder: Path, state: Any, meta: dict[str, Any]) -> None:
+    """Replace the folder's checkpoint by `state` (any pytree of arrays) and `meta` (JSON).
+
+    A crash at any moment leaves the old checkpoint or the new one.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    arrays, meta_json = tree_to_arrays(state), json.dumps(meta)
+    header = {"format_version": FORMAT_VERSION, "meta": meta_json, "sha256": _sha256(arrays, meta_json)}
+    new = folder / f"{FILE}.new"
+    try:
+        safetensors.numpy.save_file(arrays, new, metadata=header)
+        sync(new)
+        os.replace(new, folder / FILE)
+    finally:
+        new.unlink(missing_ok=True)
+    sync(folder)
+
+
+def load_checkpoint(folder: Path, template: Tree) -> tuple[Tree, dict[str, Any]] | None:
+    """The saved (state, meta), the state shaped like `template`; None if the folder has no checkpoint.
+
+    Raises:
+        RebodyError: it is damaged, of another format version, or does not fit the template.
+    """
+    path = folder / FILE
+    if not path.exists():
+        return None
+    header, arrays = _read(path)
+    if header.get("format_version") != FORMAT_VERSION:
+        raise RebodyError(
+            f"{path} was not written by this version of rebody. "
+            "Continue with the version that began the run, or start in another folder."
+        )
+    meta_json = header.get("meta", "")
+    if header.get("sha256") != _sha256(arrays, meta_json):
+        raise _damaged(path)
+    return arrays_into_tree(template, arrays, f"checkpoint {path}"), json.loads(meta_json)
+
+
+def _sha256(arrays: dict[str, np.ndarray], meta_json: str) -> str:
+    return hashlib.sha256((tree_hash(arrays) + meta_json).encode()).hexdigest()
+
+
+def _read(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray]]:
+    try:
+        with safe_open(path, framework="np") as file:
+            return file.metadata() or {}, file.get_tensors()
+    except SafetensorError as error:
+        raise _damaged(path) from error
+
+
+def _damaged(path: Path) -> RebodyError:
+    return RebodyError(
+        f"{path} is damaged: it is not what was saved. Delete it to start anew, or restore it from a copy."
+    )

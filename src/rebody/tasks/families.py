@@ -1,0 +1,63 @@
+"""The families of tasks and the reward that is all an agent ever hears of them."""
+
+import difflib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from rebody.errors import RebodyError
+from rebody.types import AnyArray, GlobalState, Task
+
+RewardForm = Literal["plain", "relative"]
+"""plain: -|error|; relative: -|error| / max(|target|, the family's floor)."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """One kind of task: which number of the body is to reach the target."""
+
+    name: str
+    unit: str
+    floor: float
+    """Smallest target magnitude that a relative reward divides by, in the family's unit."""
+    tolerance: float
+    """An episode counts as solved when its final error is within this, in the family's unit."""
+    achieved: Callable[[GlobalState], Float[AnyArray, "*batch"]]
+    """The number that is compared with the target."""
+
+
+# Velocities in a global state are means over the last decision, which is what rewards use.
+FAMILIES = (
+    Family("goal", "m", floor=1.0, tolerance=0.25, achieved=lambda state: state.x),
+    Family("velocity", "m/s", floor=0.5, tolerance=0.25, achieved=lambda state: state.vx),
+)
+GOAL, VELOCITY = range(2)
+
+
+def family_names() -> tuple[str, ...]:
+    """Names of all families, in the order of their indices."""
+    return tuple(family.name for family in FAMILIES)
+
+
+def family_index(name: str) -> int:
+    """Index of a family in `FAMILIES`; RebodyError if there is none of that name."""
+    names = family_names()
+    if name in names:
+        return names.index(name)
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"; did you mean '{near[0]}'?" if near else ""
+    raise RebodyError(f"unknown task family '{name}'{hint} Families are: {', '.join(names)}.")
+
+
+def reward(task: Task, state: GlobalState, form: RewardForm) -> Float[Array, "*batch"]:
+    """Reward of the decision that led to `state`: never a control cost, never an alive bonus."""
+    achieved = jnp.stack([family.achieved(state) for family in FAMILIES], axis=-1)
+    of_task = jnp.take_along_axis(achieved, task.family[..., None], axis=-1)[..., 0]
+    error = jnp.abs(of_task - task.target)
+    if form == "plain":
+        return -error
+    floors = jnp.asarray([family.floor for family in FAMILIES])
+    return -error / jnp.maximum(jnp.abs(task.target), floors[task.family])

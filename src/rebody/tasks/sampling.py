@@ -1,0 +1,45 @@
+"""Drawing tasks: the base task uniformly (thesis 6.2), then its target uniformly (6.3)."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import PRNGKeyArray
+
+from rebody.tasks.families import family_index
+from rebody.types import Task
+
+
+@dataclass(frozen=True)
+class BaseTask:
+    """A family with one range of targets; the thesis counts front and back as two."""
+
+    family: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class TaskDistribution:
+    """Base tasks of equal probability."""
+
+    base_tasks: tuple[BaseTask, ...]
+
+    @property
+    def families(self) -> tuple[int, ...]:
+        """Indices of the families that occur, ascending."""
+        return tuple(sorted({family_index(task.family) for task in self.base_tasks}))
+
+    def target_range(self, family: str) -> tuple[float, float]:
+        """Smallest and largest target of a family over its base tasks."""
+        ranges = [(task.low, task.high) for task in self.base_tasks if task.family == family]
+        return min(low for low, _ in ranges), max(high for _, high in ranges)
+
+    def sample(self, key: PRNGKeyArray, shape: tuple[int, ...]) -> Task:
+        """Tasks of the given batch shape."""
+        which_key, where_key = jax.random.split(key)
+        which = jax.random.randint(which_key, shape, 0, len(self.base_tasks))
+        family = jnp.asarray([family_index(task.family) for task in self.base_tasks])[which]
+        low = jnp.asarray([task.low for task in self.base_tasks])[which]
+        high = jnp.asarray([task.high for task in self.base_tasks])[which]
+        return Task(family, low + (high - low) * jax.random.uniform(where_key, shape))

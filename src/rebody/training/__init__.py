@@ -1,0 +1,1 @@
+"""Pipelines: state in, state out."""

@@ -1,0 +1,39 @@
+"""What a finished training run leaves behind: the artifact and its card."""
+
+import os
+import platform
+import shlex
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import jax
+import jaxlib
+import mujoco
+
+from rebody import __version__
+from rebody.training.run import Run
+
+
+def card(title: str, what: str, run: Run, seed: int, figures: Mapping[str, str]) -> str:
+    """Markdown: what it is, the exact command and seed that made it, wall time, machine, figures."""
+    command = shlex.join(["rebody", *sys.argv[1:]])
+    machine = f"{os.cpu_count()} x {_processor()}, {platform.system()}, Python {platform.python_version()}"
+    versions = f"rebody {__version__}, JAX {jax.__version__}, jaxlib {jaxlib.__version__}, MuJoCo {mujoco.__version__}"
+    rows = "\n".join(f"| {name} | {value} |" for name, value in figures.items())
+    return (
+        f"# {title}\n\n{what}\n\n"
+        f"- Made by: `{command}`\n- Seed: {seed}\n- Training time: {run.wall_s / 60:.1f} minutes\n"
+        f"- Machine: {machine}\n- Versions: {versions}\n\n"
+        f"Measured by the same command after training:\n\n| figure | value |\n|---|---|\n{rows}\n"
+    )
+
+
+def _processor() -> str:
+    """The processor's name as the system tells it."""
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        for line in cpuinfo.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

@@ -1,0 +1,58 @@
+"""Settings of a meta-training run."""
+
+from dataclasses import dataclass, field
+
+from rebody.bodies.toys import Randomisation
+from rebody.control.sac import SACConfig
+from rebody.inference import InferenceConfig
+from rebody.tasks import RewardForm, TaskDistribution
+
+
+@dataclass(frozen=True)
+class MetaConfig:
+    """What is learned, on which tasks, and for how long."""
+
+    tasks: TaskDistribution
+    """Base tasks and their target ranges."""
+    reward: RewardForm
+    """Form of the reward."""
+    inference: InferenceConfig
+    """Encoder, decoder and their loss."""
+    sac: SACConfig
+    """The high-level policy's learning."""
+    policy_fields: tuple[str, ...]
+    """Fields of the global state that the policy sees."""
+    policy_scales: tuple[float, ...]
+    """What each of them is divided by [m, m/s]."""
+    randomisation: Randomisation = field(default_factory=Randomisation)
+    """Disturbances of half of the episodes."""
+    observation_noise: float = 0.0
+    """Variance of the noise on every observed field (thesis, captions of 6.20)."""
+    start: tuple[float, float] = (12.0, 3.0)
+    """Episodes start at uniformly random x [m] and vx [m/s] within these."""
+    episodes: int = 64
+    """Toys that move in parallel: the first half nominal, the other disturbed."""
+    decisions: int = 100
+    """Length of an episode."""
+    groups: int = 8
+    """Iterations whose episodes are kept for learning."""
+    wander_iterations: int = 12
+    """Iterations at the start in which all toys wander and only inference learns."""
+    joint_iterations: int = 38
+    """Iterations after that in which inference and policy learn together."""
+    policy_iterations: int = 70
+    """Iterations after that in which inference is frozen and the policy learns on."""
+    inference_updates: int = 128
+    """Updates of encoder and decoder in an iteration."""
+    policy_updates: int = 512
+    """Updates of the policy in an iteration."""
+
+    @property
+    def inference_iterations(self) -> int:
+        """Iterations after which the inference module is frozen."""
+        return self.wander_iterations + self.joint_iterations
+
+    @property
+    def iterations(self) -> int:
+        """Length of the run."""
+        return self.inference_iterations + self.policy_iterations

@@ -1,0 +1,117 @@
+"""Collecting episodes on the toy, and what is kept of them."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
+
+from rebody.bodies.toys import Toy, ToyState, no_disturbance
+from rebody.control.high_level import policy_observation
+from rebody.control.sac import Actor
+from rebody.inference import Encoder
+from rebody.tasks import reward
+from rebody.training.inference.config import MetaConfig
+from rebody.types import Belief, GlobalState, Transition
+
+TURN_PROBABILITY = 0.15
+"""Chance per decision that a wandering toy changes its mind."""
+
+
+class Episodes(eqx.Module):
+    """Episodes as learning needs them; states and beliefs have one entry more than actions."""
+
+    state: GlobalState  # [*groups, episode, time + 1]
+    belief: Belief  # [*groups, episode, time + 1]
+    action: Float[Array, "*groups episode time action"]
+    reward: Float[Array, "*groups episode time"]
+
+
+@eqx.filter_jit
+def collect(
+    encoder: Encoder,
+    actor: Actor,
+    toy: Toy,
+    config: MetaConfig,
+    wanders: Bool[Array, " episode"],
+    key: PRNGKeyArray,
+) -> Episodes:
+    """Let toys act on hidden tasks by what they believe; those that wander hold random actions instead.
+
+    The belief is always built from the running episode alone, never from stored ones.
+    """
+    task_key, start_key, observe_key, held_key, walk_key = jax.random.split(key, 5)
+    shape = (config.episodes,)
+    task = config.tasks.sample(task_key, shape)
+    body = _random_start(toy, config, start_key)
+    seen = _observe(toy, body, config, observe_key)
+    belief = encoder.prior(shape)
+    held = jax.random.uniform(held_key, (*shape, 1), minval=-1.0)
+
+    def decide(walk, key):
+        body, seen, carry, belief, held = walk
+        action_key, step_key, noise_key, wander_key = jax.random.split(key, 4)
+        observation = policy_observation(seen, belief, config.policy_fields, config.policy_scales)
+        action, _ = actor.sample(observation, action_key)
+        held = _wander(held, wander_key)
+        action = jnp.where(wanders[:, None], held, action)
+        body = toy.step(body, action, step_key)
+        earned = reward(task, toy.observe(body), config.reward)
+        now_seen = _observe(toy, body, config, noise_key)
+        carry, belief = encoder.step(carry, Transition(seen, earned, now_seen))
+        return (body, now_seen, carry, belief, held), (now_seen, belief, action, earned)
+
+    walk = (body, seen, encoder.initial(shape), belief, held)
+    keys = jax.random.split(walk_key, config.decisions)
+    _, (states, beliefs, actions, rewards) = jax.lax.scan(decide, walk, keys)
+    time_major = Episodes(_prepend(seen, states), _prepend(belief, beliefs), actions, rewards)
+    return jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), time_major)
+
+
+@eqx.filter_jit
+def refresh_beliefs(encoder: Encoder, episodes: Episodes) -> Episodes:
+    """The same episodes with the beliefs that today's encoder holds along them."""
+    time_major = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 2, 0), episodes)
+    transitions = Transition(
+        jax.tree.map(lambda leaf: leaf[:-1], time_major.state),
+        time_major.reward,
+        jax.tree.map(lambda leaf: leaf[1:], time_major.state),
+    )
+    shape = transitions.reward.shape[1:]
+    _, beliefs = jax.lax.scan(
+        lambda carry, transition: encoder.step(carry, transition), encoder.initial(shape), transitions
+    )
+    beliefs = _prepend(encoder.prior(shape), beliefs)
+    beliefs = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, 2), beliefs)
+    return eqx.tree_at(lambda e: e.belief, episodes, beliefs)
+
+
+def _random_start(toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> ToyState:
+    """Anywhere, at any speed, so that the latent cannot take the start for the task."""
+    where_key, disturbance_key = jax.random.split(key)
+    far, fast = config.start
+    x, vx = jax.random.uniform(where_key, (2, config.episodes), minval=-1.0) * jnp.asarray([[far], [fast]])
+    shape = (config.episodes,)
+    nominal = jnp.arange(config.episodes) < config.episodes // 2
+    disturbance = jax.tree.map(
+        lambda calm, rough: jnp.where(nominal, calm, rough),
+        no_disturbance(shape),
+        config.randomisation.sample(disturbance_key, shape),
+    )
+    return toy.initial(x, vx, disturbance)
+
+
+def _wander(held: Float[Array, "episode 1"], key: PRNGKeyArray) -> Float[Array, "episode 1"]:
+    turn_key, action_key = jax.random.split(key)
+    turns = jax.random.bernoulli(turn_key, TURN_PROBABILITY, held.shape)
+    return jnp.where(turns, jax.random.uniform(action_key, held.shape, minval=-1.0), held)
+
+
+def _observe(toy: Toy, body: ToyState, config: MetaConfig, key: PRNGKeyArray) -> GlobalState:
+    state = toy.observe(body)
+    leaves, tree = jax.tree.flatten(state)
+    noise = config.observation_noise**0.5 * jax.random.normal(key, (len(leaves), *state.x.shape))
+    return tree.unflatten([leaf + disturbed for leaf, disturbed in zip(leaves, noise, strict=True)])
+
+
+def _prepend(first, rest):
+    return jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), first, rest)

@@ -1,0 +1,161 @@
+"""What every training run shares: checkpoints, resuming, logs, progress, a clean stop.
+
+A pipeline gives a declared state with an `iteration` and a function that takes one turn; everything here
+is about not losing what it does.
+"""
+
+import json
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from tensorboardX import SummaryWriter
+
+from rebody.errors import RebodyError
+from rebody.store import load_checkpoint, save_checkpoint
+
+Metrics = dict[str, float]
+
+
+class RunState(Protocol):
+    """Everything that a resumed run needs: a pytree that counts its iterations."""
+
+    iteration: Any
+
+
+State = TypeVar("State", bound=RunState)
+
+
+class Interrupted(Exception):
+    """Ctrl-C during training; the run is checkpointed."""
+
+
+class Run:
+    """One training run in a folder."""
+
+    def __init__(
+        self, out: Path, settings: dict[str, Any], *, resume: bool = False, checkpoint_every_s: float = 120.0
+    ):
+        """`settings` identify the run: a checkpoint made with others is not resumed."""
+        self.out = out
+        self.settings = json.loads(json.dumps(settings))
+        self.resume = resume
+        self.checkpoint_every_s = checkpoint_every_s
+        self.wall_s = 0.0
+        """Seconds of training so far, over all resumptions."""
+        if not resume and ((out / "checkpoint").exists() or (out / "manifest.json").exists()):
+            raise RebodyError(f"{out} already holds a run. Add --resume to go on with it, or choose another --out.")
+
+    def restore(self, state: State) -> State:
+        """The checkpointed state if this run is resumed and has one, else the given fresh one."""
+        found = load_checkpoint(self._checkpoint, state) if self.resume else None
+        if found is None:
+            return state
+        state, meta = found
+        if meta["settings"] != self.settings:
+            changed = sorted(
+                name
+                for name in meta["settings"].keys() | self.settings.keys()
+                if meta["settings"].get(name) != self.settings.get(name)
+            )
+            raise RebodyError(
+                f"cannot resume {self.out}: it was begun with other settings ({', '.join(changed)}). "
+                "Use the same ones, or choose another --out."
+            )
+        self.wall_s = meta["wall_s"]
+        return state
+
+    def loop(
+        self, state: State, iterate: Callable[[State], tuple[State, Metrics]], iterations: int, label: str
+    ) -> State:
+        """Take turns until `iterations` are done; Interrupted after Ctrl-C, RebodyError if a loss diverges."""
+        begun, saved = time.monotonic() - self.wall_s, time.monotonic()
+        with self._progress(label, iterations, int(state.iteration)) as show, _interrupts() as interrupted:
+            with SummaryWriter(str(self.out / "events")) as writer:
+                while int(state.iteration) < iterations:
+                    state, metrics = iterate(state)
+                    _check_finite(metrics, self.out)
+                    self.wall_s = time.monotonic() - begun
+                    self._log(writer, metrics, int(state.iteration))
+                    show(int(state.iteration), metrics)
+                    if interrupted() or time.monotonic() - saved > self.checkpoint_every_s:
+                        self._save(state)
+                        saved = time.monotonic()
+                    if interrupted():
+                        raise Interrupted(f"stopped; go on with the same command and --resume ({self.out})")
+        self._save(state)
+        return state
+
+    @property
+    def _checkpoint(self) -> Path:
+        return self.out / "checkpoint"
+
+    def _save(self, state: RunState) -> None:
+        save_checkpoint(self._checkpoint, state, {"settings": self.settings, "wall_s": self.wall_s})
+
+    def _log(self, writer: SummaryWriter, metrics: Metrics, iteration: int) -> None:
+        for name, value in metrics.items():
+            writer.add_scalar(name, value, iteration, walltime=self.wall_s)
+
+    @contextmanager
+    def _progress(self, label: str, total: int, done: int) -> Iterator[Callable[[int, Metrics], None]]:
+        console = Console(stderr=True)
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=30),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(elapsed_when_finished=False),
+            TextColumn("{task.fields[note]}"),
+        )
+        with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+            task = progress.add_task(label, total=total, completed=done, note="")
+            last_line = time.monotonic()
+
+            def show(iteration: int, metrics: Metrics) -> None:
+                nonlocal last_line
+                evaluation = {name: value for name, value in metrics.items() if name.startswith("evaluation/")}
+                note = "  ".join(f"{name.split('/')[1]} {value:.3g}" for name, value in evaluation.items())
+                progress.update(task, completed=iteration, **({"note": note} if note else {}))
+                # without a terminal (a log file) a line now and then says the same
+                if not console.is_terminal and (note or time.monotonic() - last_line > 30):
+                    last_line = time.monotonic()
+                    left = self.wall_s / max(iteration, 1) * (total - iteration)
+                    console.print(
+                        f"{label} {iteration}/{total}  {self.wall_s:.0f} s, about {left:.0f} s left  {note}",
+                        highlight=False, soft_wrap=True,
+                    )  # fmt: skip
+
+            yield show
+
+
+@contextmanager
+def _interrupts() -> Iterator[Callable[[], bool]]:
+    """While inside, Ctrl-C is noted instead of raised, so that a turn is never cut in half."""
+    noted = False
+
+    def note(*_: object) -> None:
+        nonlocal noted
+        noted = True
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: noted
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _check_finite(metrics: Metrics, out: Path) -> None:
+    bad = [name for name, value in metrics.items() if not np.isfinite(value)]
+    if bad:
+        raise RebodyError(
+            f"training diverged: {', '.join(bad)} is not finite. The last checkpoint in {out} is from before; "
+            "try a smaller learning rate."
+        )

@@ -1,0 +1,66 @@
+"""Commands that a tracker learns from: far and near goals, speeds, standstill, and what a toy would ask."""
+
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, PRNGKeyArray
+
+from rebody.bodies.toys import MassDamper, ToyState
+from rebody.control.tracker import Command
+from rebody.tasks import GOAL, VELOCITY
+from rebody.types import GlobalState, Subgoal, Task
+
+
+@dataclass(frozen=True)
+class CommandDistribution:
+    """How commands are drawn."""
+
+    max_distance: float = 5.0
+    """Farthest goal [m]; farther ones are cut to it when the tracker is used."""
+    max_speed: float = 3.3
+    """Fastest speed [m/s], a little beyond what is asked later."""
+    near_share: float = 0.35
+    """Share of goals drawn log-uniformly between 0.01 and 1 m."""
+    zero_share: float = 0.1
+    """Share of commands that ask to stand still."""
+
+    def sample(self, key: PRNGKeyArray, shape: tuple[int, ...]) -> Command:
+        """Commands of the given batch shape."""
+        keys = jax.random.split(key, 6)
+        far = jax.random.uniform(keys[0], shape, minval=-self.max_distance, maxval=self.max_distance)
+        sign = jnp.where(jax.random.bernoulli(keys[1], shape=shape), 1.0, -1.0)
+        near = sign * 10.0 ** jax.random.uniform(keys[2], shape, minval=-2.0, maxval=0.0)
+        goal = jnp.where(jax.random.bernoulli(keys[3], self.near_share, shape), near, far)
+        speed = far * (self.max_speed / self.max_distance)
+        slot = jax.random.randint(keys[4], shape, GOAL, VELOCITY + 1)
+        still = jax.random.bernoulli(keys[5], self.zero_share, shape)
+        return Command(slot, jnp.where(still, 0.0, jnp.where(slot == GOAL, goal, speed)))
+
+
+class ToyGuide(eqx.Module):
+    """A toy that a scripted policy drives to a hidden task, seen `horizon` decisions ahead of the robot."""
+
+    task: Task
+    horizon: Int[Array, " robot"]
+
+    def subgoal(self, state: GlobalState, max_horizon: int) -> Subgoal:
+        """Where the toy would be, from the robot's own state: the subgoals of `reuse` (thesis 5.6.2)."""
+        toy = MassDamper()
+
+        def step(toy_state: ToyState, decision):
+            moved = toy.step(toy_state, _scripted_action(toy, toy_state, self.task), jax.random.key(0))
+            keep = decision < self.horizon
+            return jax.tree.map(lambda new, old: jnp.where(keep, new, old), moved, toy_state), None
+
+        ahead, _ = jax.lax.scan(step, toy.from_global(state), jnp.arange(max_horizon))
+        return Subgoal(self.task.family, jnp.where(self.task.family == GOAL, ahead.x, ahead.drift))
+
+
+def _scripted_action(toy: MassDamper, state: ToyState, task: Task) -> Float[Array, "*batch 1"]:
+    """Full force towards a goal until braking is due, or the force that brings the speed at once."""
+    braked = state.x + state.drift * toy.mass / toy.damping
+    speed = jnp.where(task.family == GOAL, 10.0 * (task.target - braked), task.target)
+    force = toy.damping * state.drift + toy.mass * (speed - state.drift) / 0.1
+    return jnp.clip(force / toy.max_force, -1.0, 1.0)[..., None]

@@ -1,0 +1,37 @@
+"""Settings of a tracker's training run."""
+
+from dataclasses import dataclass, field
+
+from rebody.control.sac import SACConfig
+from rebody.control.tracker import TrackerReward
+from rebody.training.tracker.commands import CommandDistribution
+
+
+@dataclass(frozen=True)
+class TrackerConfig:
+    """One training run of a tracker."""
+
+    robots: int = 64
+    """Copies that move in parallel."""
+    steps: int = 32
+    """Control steps of each robot in an iteration."""
+    updates: int = 256
+    """Updates in an iteration."""
+    iterations: int = 700
+    """Length of the run."""
+    replay: int = 500_000
+    """Transitions kept."""
+    relabelled: float = 0.5
+    """Share of a batch whose commands are drawn anew."""
+    segment_s: tuple[float, float] = (1.0, 8.0)
+    """Shortest and longest time between changes of the command (thesis 6.3.3) [s]."""
+    guided_share: float = 0.25
+    """Share of commands that come from a toy ahead of the robot, renewed at every decision."""
+    max_horizon: int = 15
+    """Farthest look ahead of that toy [decisions]."""
+    commands: CommandDistribution = field(default_factory=CommandDistribution)
+    """How commands are drawn."""
+    reward: TrackerReward = field(default_factory=TrackerReward)
+    """What the tracker is paid."""
+    sac: SACConfig = field(default_factory=lambda: SACConfig(decay_updates=180_000))
+    """Hyperparameters of soft actor-critic."""

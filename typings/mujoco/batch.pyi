@@ -1,0 +1,4 @@
+# MuJoCo's classes are compiled and come without types.
+from typing import Any
+
+def __getattr__(name: str) -> Any: ...
