@@ -21,9 +21,7 @@ def roll(toy, actions, **disturbance):
     state = toy.initial(
         jnp.zeros(()),
         jnp.zeros(()),
-        eqx.tree_at(lambda d: tuple(getattr(d, field) for field in fields), nominal, values)
-        if fields
-        else nominal,
+        eqx.tree_at(lambda d: tuple(getattr(d, field) for field in fields), nominal, values) if fields else nominal,
     )
     states = []
     for key, action in zip(jax.random.split(jax.random.key(0), len(actions)), actions, strict=True):

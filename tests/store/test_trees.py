@@ -41,9 +41,7 @@ def test_every_leaf_comes_back_as_it_was():
     blank = jax.tree.map(lambda leaf: np.zeros_like(leaf) if isinstance(leaf, np.ndarray) else leaf, tree)
     restored = arrays_into_tree(blank, tree_to_arrays(tree), "test")
     assert eqx.tree_equal(restored, tree)
-    assert [type(leaf) for leaf in jax.tree.leaves(restored)] == [
-        type(leaf) for leaf in jax.tree.leaves(tree)
-    ]
+    assert [type(leaf) for leaf in jax.tree.leaves(restored)] == [type(leaf) for leaf in jax.tree.leaves(tree)]
     assert restored["static"] == 7
     assert jax.random.uniform(restored["keys"][0]) == jax.random.uniform(tree["keys"][0])
 

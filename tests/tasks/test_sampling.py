@@ -7,9 +7,7 @@ import pytest
 from rebody.errors import RebodyError
 from rebody.tasks import GOAL, VELOCITY, BaseTask, TaskDistribution
 
-TASKS = TaskDistribution(
-    (BaseTask("velocity", 1.0, 3.0), BaseTask("goal", -15.0, -2.0), BaseTask("goal", 2.0, 15.0))
-)
+TASKS = TaskDistribution((BaseTask("velocity", 1.0, 3.0), BaseTask("goal", -15.0, -2.0), BaseTask("goal", 2.0, 15.0)))
 
 
 @pytest.fixture(scope="module")

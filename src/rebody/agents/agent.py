@@ -5,26 +5,26 @@ from abc import abstractmethod
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
 from rebody.bodies.toys import Toy
 from rebody.control.high_level import HighLevelPolicy
 from rebody.inference import Encoder, EncoderCarry
 from rebody.tasks import FAMILIES, GOAL, VELOCITY
-from rebody.types import Belief, GlobalState, Subgoal, Task, Transition
+from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task, Transition
 
 
 class Observation(eqx.Module):
     """What an agent hears at a decision; the reward is that of the decision just ended."""
 
     state: GlobalState
-    reward: Float[Array, "*batch"]
+    reward: Float[AnyArray, "*batch"]
 
 
 class Command(eqx.Module):
     """What an agent says: an action for a toy, a subgoal for a robot's tracker."""
 
-    action: Float[Array, "*batch 1"]
+    action: Float[AnyArray, "*batch 1"]
     subgoal: Subgoal
 
 
@@ -35,7 +35,7 @@ class Carry(eqx.Module):
     belief: Belief
     previous: GlobalState
     command: Command
-    decisions: Int[Array, ""]
+    decisions: Int[AnyArray, ""]
 
 
 class Agent(eqx.Module):
@@ -75,6 +75,7 @@ class ReuseAgent(Agent):
     horizon: int = eqx.field(static=True)
 
     def command(self, state: GlobalState, belief: Belief) -> Command:
+        """The policy's action for a toy; for a robot, where that policy would lead a toy from here."""
         action = self.high_level(state, belief)
         ahead = self.imagine(state, belief)
         value = FAMILIES[self.family].achieved(ahead)
@@ -98,6 +99,7 @@ class OracleAgent(Agent):
     task: Task
 
     def command(self, state: GlobalState, belief: Belief) -> Command:
+        """The true target."""
         return Command(jnp.zeros((*state.x.shape, 1)), Subgoal(self.task.family, self.task.target))
 
 
@@ -105,10 +107,11 @@ class IdleAgent(Agent):
     """Knows nothing and stands still: what a robot without inference would get."""
 
     def command(self, state: GlobalState, belief: Belief) -> Command:
+        """A speed of zero."""
         still = Subgoal(jnp.full(state.x.shape, VELOCITY), jnp.zeros_like(state.x))
         return Command(jnp.zeros((*state.x.shape, 1)), still)
 
 
-def relative(subgoal: Subgoal, x: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+def relative(subgoal: Subgoal, x: Float[AnyArray, "*batch"]) -> Float[AnyArray, "*batch"]:
     """A subgoal as the robot sees it now: a goal is a point in the world, so its distance shrinks."""
     return subgoal.value - jnp.where(subgoal.slot == GOAL, x, 0.0)

@@ -115,11 +115,12 @@ def build_agent(
 
 
 def _only_family(inference: Inference) -> int:
-    if len(inference.contract.families) > 1:
+    family, *others = inference.contract.families
+    if others:
         raise RebodyError(
             f"'{inference.name}' tells several families apart; `reuse` can drive modules of one family so far."
         )
-    return inference.contract.families[0]
+    return family
 
 
 def _actor_template(observations: int, actions: int, config: dict[str, Any]) -> Actor:

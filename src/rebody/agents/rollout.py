@@ -6,7 +6,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Bool, Float, Int
 
 from rebody.agents.agent import Agent, Carry, Observation, relative
 from rebody.bodies.robot import RobotBatch, RobotSpec
@@ -14,7 +14,6 @@ from rebody.bodies.toys import Disturbance, Toy
 from rebody.control.tracker import Command, Tracker
 from rebody.tasks import RewardForm, reward
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task
-
 
 OnFrame = Callable[[RobotBatch, Subgoal], None]
 
@@ -85,7 +84,8 @@ def rollout_on_robot(
         records.append((state, earned, carry.belief, command.subgoal))
         command = following
     stacked = jax.tree.map(lambda *steps: np.stack(steps), *records)
-    return Episodes(*stacked, fell)
+    state, earned, belief, subgoal = stacked
+    return Episodes(state, earned, belief, subgoal, fell)
 
 
 def follow(tracker: Tracker, batch: RobotBatch, subgoal: Subgoal) -> None:
@@ -96,7 +96,7 @@ def follow(tracker: Tracker, batch: RobotBatch, subgoal: Subgoal) -> None:
 
 
 @eqx.filter_jit
-def _track(tracker: Tracker, joints, subgoal: Subgoal, x) -> Float[Array, "episode action"]:
+def _track(tracker: Tracker, joints, subgoal: Subgoal, x) -> Float[AnyArray, "episode action"]:
     return tracker(joints, Command(subgoal.slot, relative(subgoal, x)))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Float, PRNGKeyArray
 
 from rebody.types import DECISION_DT, AnyArray, GlobalState
 
@@ -18,12 +18,12 @@ from rebody.types import DECISION_DT, AnyArray, GlobalState
 class Disturbance(eqx.Module):
     """How one episode's toy departs from the nominal one."""
 
-    ripple_amplitude: Float[Array, "*batch"]  # m/s, of a sine on the velocity, as a gait has
-    ripple_period: Float[Array, "*batch"]  # s
-    ripple_phase: Float[Array, "*batch"]  # rad
-    lag: Float[Array, "*batch"]  # s, time constant between action and force
-    gain: Float[Array, "*batch"]  # share of the force that arrives
-    state_noise: Float[Array, "*batch"]  # std of the noise on x [m] and v [m/s] at each step
+    ripple_amplitude: Float[AnyArray, "*batch"]  # m/s, of a sine on the velocity, as a gait has
+    ripple_period: Float[AnyArray, "*batch"]  # s
+    ripple_phase: Float[AnyArray, "*batch"]  # rad
+    lag: Float[AnyArray, "*batch"]  # s, time constant between action and force
+    gain: Float[AnyArray, "*batch"]  # share of the force that arrives
+    state_noise: Float[AnyArray, "*batch"]  # std of the noise on x [m] and v [m/s] at each step
 
 
 def no_disturbance(shape: tuple[int, ...]) -> Disturbance:
@@ -60,20 +60,18 @@ class Randomisation:
         )
 
 
-def _between(
-    key: PRNGKeyArray, shape: tuple[int, ...], bounds: tuple[float, float]
-) -> Float[Array, "*batch"]:
+def _between(key: PRNGKeyArray, shape: tuple[int, ...], bounds: tuple[float, float]) -> Float[AnyArray, "*batch"]:
     return jax.random.uniform(key, shape, minval=bounds[0], maxval=bounds[1])
 
 
 class ToyState(eqx.Module):
     """Where a toy is; `vx` holds the mean velocity of the last step, ripple included."""
 
-    x: Float[Array, "*batch"]  # m
-    vx: Float[Array, "*batch"]  # m/s, displacement over the last step divided by its duration
-    drift: Float[Array, "*batch"]  # m/s, velocity without the ripple: what the dynamics act on
-    force: Float[Array, "*batch"]  # N, behind the action where there is a lag
-    time: Float[Array, "*batch"]  # s
+    x: Float[AnyArray, "*batch"]  # m
+    vx: Float[AnyArray, "*batch"]  # m/s, displacement over the last step divided by its duration
+    drift: Float[AnyArray, "*batch"]  # m/s, velocity without the ripple: what the dynamics act on
+    force: Float[AnyArray, "*batch"]  # N, behind the action where there is a lag
+    time: Float[AnyArray, "*batch"]  # s
     disturbance: Disturbance
 
 
@@ -81,7 +79,7 @@ class Toy(eqx.Module):
     """A point mass that moves along x."""
 
     @abstractmethod
-    def step(self, state: ToyState, action: Float[Array, "*batch 1"], key: PRNGKeyArray) -> ToyState:
+    def step(self, state: ToyState, action: Float[AnyArray, "*batch 1"], key: PRNGKeyArray) -> ToyState:
         """One decision with an action in [-1, 1]; the key feeds the noise."""
 
     def initial(
@@ -116,7 +114,7 @@ class MassDamper(Toy):
     damping: float = 2.0  # N s/m
     max_force: float = 7.0  # N
 
-    def step(self, state: ToyState, action: Float[Array, "*batch 1"], key: PRNGKeyArray) -> ToyState:
+    def step(self, state: ToyState, action: Float[AnyArray, "*batch 1"], key: PRNGKeyArray) -> ToyState:
         """The action is the share of the largest force."""
         disturbance = state.disturbance
         noise = disturbance.state_noise * jax.random.normal(key, (2, *state.x.shape))
@@ -133,7 +131,7 @@ class PositionToy(Toy):
 
     max_step: float = 0.1  # m
 
-    def step(self, state: ToyState, action: Float[Array, "*batch 1"], key: PRNGKeyArray) -> ToyState:
+    def step(self, state: ToyState, action: Float[AnyArray, "*batch 1"], key: PRNGKeyArray) -> ToyState:
         """The action is the share of the largest step."""
         noise = state.disturbance.state_noise * jax.random.normal(key, state.x.shape)
         wanted = state.disturbance.gain * self.max_step * jnp.clip(action[..., 0], -1.0, 1.0)

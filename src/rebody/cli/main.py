@@ -41,7 +41,7 @@ def parse(arguments: list[str]):
     from rebody.cli.evaluate import Evaluate
     from rebody.cli.listing import List
     from rebody.cli.run import RunTask
-    from rebody.cli.train import train_inference_default, TrainInference, TrainTracker
+    from rebody.cli.train import TrainInference, TrainTracker, train_inference_default
 
     commands = (
         Annotated[Demo, tyro.conf.subcommand("demo")]
@@ -51,9 +51,7 @@ def parse(arguments: list[str]):
     )
     if arguments[:1] == ["train"]:
         commands = (
-            Annotated[
-                TrainInference, tyro.conf.subcommand("inference", default=train_inference_default(arguments))
-            ]
+            Annotated[TrainInference, tyro.conf.subcommand("inference", default=train_inference_default(arguments))]
             | Annotated[TrainTracker, tyro.conf.subcommand("tracker")]
         )
         return tyro.cli(commands, prog="rebody train", args=arguments[1:])

@@ -10,10 +10,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optax
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Float, PRNGKeyArray
 
 from rebody.nn import MLP, MultiScale
-from rebody.types import Tree
+from rebody.types import AnyArray, Tree
 
 LOG_STD_RANGE = (-5.0, 1.0)
 
@@ -52,11 +52,11 @@ class SACConfig:
 class SACBatch(eqx.Module):
     """Transitions; `terminal` is 1 where the episode truly ended (no value beyond)."""
 
-    observation: Float[Array, "batch observation"]
-    action: Float[Array, "batch action"]  # in [-1, 1]
-    reward: Float[Array, " batch"]
-    next_observation: Float[Array, "batch observation"]
-    terminal: Float[Array, " batch"]
+    observation: Float[AnyArray, "batch observation"]
+    action: Float[AnyArray, "batch action"]  # in [-1, 1]
+    reward: Float[AnyArray, " batch"]
+    next_observation: Float[AnyArray, "batch observation"]
+    terminal: Float[AnyArray, " batch"]
 
 
 class Network(eqx.Module):
@@ -71,7 +71,8 @@ class Network(eqx.Module):
         seen = self.multi_scale.outputs if self.multi_scale else inputs
         self.mlp = MLP(seen, outputs, config.hidden, key=mlp_key, **mlp_options)
 
-    def __call__(self, x: Float[Array, "*batch inputs"]) -> Float[Array, "*batch outputs"]:
+    def __call__(self, x: Float[AnyArray, "*batch inputs"]) -> Float[AnyArray, "*batch outputs"]:
+        """The MLP's outputs."""
         return self.mlp(x if self.multi_scale is None else self.multi_scale(x))
 
 
@@ -86,13 +87,13 @@ class Actor(eqx.Module):
         self.observations, self.actions = observations, actions
         self.net = Network(observations, 2 * actions, config, key=key, last_scale=0.1)
 
-    def __call__(self, observation: Float[Array, "*batch observation"]) -> Float[Array, "*batch action"]:
+    def __call__(self, observation: Float[AnyArray, "*batch observation"]) -> Float[AnyArray, "*batch action"]:
         """The most likely action."""
         return jnp.tanh(self._gaussian(observation)[0])
 
     def sample(
-        self, observation: Float[Array, "*batch observation"], key: PRNGKeyArray
-    ) -> tuple[Float[Array, "*batch action"], Float[Array, "*batch"]]:
+        self, observation: Float[AnyArray, "*batch observation"], key: PRNGKeyArray
+    ) -> tuple[Float[AnyArray, "*batch action"], Float[AnyArray, "*batch"]]:
         """An action and its log-probability density [nats]."""
         mean, log_std = self._gaussian(observation)
         noise = jax.random.normal(key, mean.shape)
@@ -120,8 +121,8 @@ class Critics(eqx.Module):
         self.second = Network(inputs, 1, config, key=second_key, layer_norm=True)
 
     def __call__(
-        self, observation: Float[Array, "*batch observation"], action: Float[Array, "*batch action"]
-    ) -> Float[Array, "2 *batch"]:
+        self, observation: Float[AnyArray, "*batch observation"], action: Float[AnyArray, "*batch action"]
+    ) -> Float[AnyArray, "2 *batch"]:
         """The value that each critic gives."""
         x = jnp.concatenate([observation, action], axis=-1)
         return jnp.stack([self.first(x)[..., 0], self.second(x)[..., 0]])
@@ -134,7 +135,7 @@ class SACState(eqx.Module):
     averaged_actor: Actor
     critics: Critics
     target_critics: Critics
-    log_temperature: Float[Array, ""]
+    log_temperature: Float[AnyArray, ""]
     actor_optimiser: optax.OptState
     critic_optimiser: optax.OptState
     temperature_optimiser: optax.OptState
@@ -161,7 +162,7 @@ def initial_state(observations: int, actions: int, config: SACConfig, key: PRNGK
 
 def update(
     state: SACState, batch: SACBatch, key: PRNGKeyArray, config: SACConfig
-) -> tuple[SACState, dict[str, Float[Array, ""]]]:
+) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """One step of critics, actor and temperature, then of the two moving averages."""
     critic_key, actor_key = jax.random.split(key)
     state, critic_metrics = _update_critics(state, batch, critic_key, config)
@@ -206,18 +207,14 @@ def _update_temperature(state, entropy, batch, config):
     """Raise alpha while the entropy is below its target, lower it above."""
     gradient = entropy - config.target_entropy * batch.action.shape[-1]
     log_temperature, optimiser = _apply(gradient, state.log_temperature, state.temperature_optimiser, config)
-    state = eqx.tree_at(
-        lambda s: (s.log_temperature, s.temperature_optimiser), state, (log_temperature, optimiser)
-    )
+    state = eqx.tree_at(lambda s: (s.log_temperature, s.temperature_optimiser), state, (log_temperature, optimiser))
     return state, {"temperature": jnp.exp(log_temperature)}
 
 
 def _update_averages(state, config):
     target_critics = _average(state.target_critics, state.critics, config.target_rate)
     averaged_actor = _average(state.averaged_actor, state.actor, config.average_rate)
-    return eqx.tree_at(
-        lambda s: (s.target_critics, s.averaged_actor), state, (target_critics, averaged_actor)
-    )
+    return eqx.tree_at(lambda s: (s.target_critics, s.averaged_actor), state, (target_critics, averaged_actor))
 
 
 def _average(old: Tree, new: Tree, rate: float) -> Tree:

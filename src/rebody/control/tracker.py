@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
 from rebody.control.sac import Actor
 from rebody.tasks.families import GOAL
+from rebody.types import AnyArray
 
 SLOTS = ("goal", "velocity")
 """Families that a command can address, by index."""
@@ -20,8 +21,8 @@ SLOTS = ("goal", "velocity")
 class Command(eqx.Module):
     """A subgoal relative to the robot."""
 
-    slot: Int[Array, "*batch"]
-    value: Float[Array, "*batch"]  # goal: m ahead of the robot; velocity: m/s
+    slot: Int[AnyArray, "*batch"]
+    value: Float[AnyArray, "*batch"]  # goal: m ahead of the robot; velocity: m/s
 
 
 @dataclass(frozen=True)
@@ -47,16 +48,14 @@ class Tracker(eqx.Module):
     max_distance: float = eqx.field(static=True)
     max_speed: float = eqx.field(static=True)
 
-    def __call__(
-        self, joints: Float[Array, "*batch joint"], command: Command
-    ) -> Float[Array, "*batch action"]:
+    def __call__(self, joints: Float[AnyArray, "*batch joint"], command: Command) -> Float[AnyArray, "*batch action"]:
         """Joint action in [-1, 1]."""
         return self.actor(tracker_observation(joints, command, self.max_distance, self.max_speed))
 
 
 def tracker_observation(
-    joints: Float[Array, "*batch joint"], command: Command, max_distance: float, max_speed: float
-) -> Float[Array, "*batch feature"]:
+    joints: Float[AnyArray, "*batch joint"], command: Command, max_distance: float, max_speed: float
+) -> Float[AnyArray, "*batch feature"]:
     """Joint state and command, the goal on three scales so that centimetres count as metres do."""
     is_goal = (command.slot == GOAL).astype(joints.dtype)
     ahead = is_goal * jnp.clip(command.value, -max_distance, max_distance)
@@ -67,12 +66,12 @@ def tracker_observation(
 
 def tracker_reward(
     command: Command,
-    displacement: Float[Array, "*batch"],
+    displacement: Float[AnyArray, "*batch"],
     control_dt: float,
-    pitch: Float[Array, "*batch"],
-    action: Float[Array, "*batch action"],
+    pitch: Float[AnyArray, "*batch"],
+    action: Float[AnyArray, "*batch action"],
     weights: TrackerReward,
-) -> Float[Array, "*batch"]:
+) -> Float[AnyArray, "*batch"]:
     """Pay for one control step that moved the robot by `displacement` [m] and left it at `pitch` [rad].
 
     Linear in the error, so that standing still is never the best answer to a speed; a pull on arrival.

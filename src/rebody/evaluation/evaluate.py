@@ -10,7 +10,7 @@ from rebody.agents.parts import HORIZON, Inference, LoadedTracker, build_agent, 
 from rebody.agents.rollout import Episodes, OnFrame, rollout_on_robot, rollout_on_toy
 from rebody.bodies import RobotSpec
 from rebody.errors import RebodyError
-from rebody.evaluation.results import EpisodeResult, Results, episode_results
+from rebody.evaluation.results import Results, episode_results
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, Task
 
@@ -68,9 +68,7 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
     )
 
 
-def _run(
-    trial: Trial, kind: str, tasks: Task, seeds: np.ndarray, on_frame: OnFrame | None = None
-) -> Episodes:
+def _run(trial: Trial, kind: str, tasks: Task, seeds: np.ndarray, on_frame: OnFrame | None = None) -> Episodes:
     agent: Agent = build_agent(kind, trial.inference, tasks, stride=trial.stride, horizon=trial.horizon)
     form = trial.inference.contract.reward
     if trial.robot is None:

@@ -6,14 +6,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 from jaxtyping import Float, Int
 
 from rebody.agents.rollout import Episodes
-from rebody.tasks.figures import final_error, final_squared_error, ripple
 from rebody.evaluation.summary import summarise
 from rebody.tasks import FAMILIES
+from rebody.tasks.figures import final_error, final_squared_error, ripple
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import DECISION_DT, AnyArray, Task
 

@@ -22,8 +22,7 @@ def summarise(episodes: Sequence["EpisodeResult"]) -> dict[str, Any]:
         "fell": with_interval([episode.fell for episode in episodes], np.mean),
         "regret": _regret(episodes),
         "families": {
-            family: _of_family(family, [e for e in episodes if e.active_family[-1] == family])
-            for family in families
+            family: _of_family(family, [e for e in episodes if e.active_family[-1] == family]) for family in families
         },
     }
 

@@ -3,16 +3,17 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Float, PRNGKeyArray
 
 from rebody.nn import MLP
+from rebody.types import AnyArray
 
 
 class Gaussian(eqx.Module):
     """Mean and log-variance of a prediction."""
 
-    mean: Float[Array, "*batch"]
-    log_variance: Float[Array, "*batch"]
+    mean: Float[AnyArray, "*batch"]
+    log_variance: Float[AnyArray, "*batch"]
 
 
 class Decoder(eqx.Module):
@@ -41,17 +42,15 @@ class Decoder(eqx.Module):
 
     def next_state(
         self,
-        state: Float[Array, "*batch field"],
-        action: Float[Array, "*batch action"],
-        latent: Float[Array, "*batch latent"],
-    ) -> Float[Array, "*batch field"]:
+        state: Float[AnyArray, "*batch field"],
+        action: Float[AnyArray, "*batch action"],
+        latent: Float[AnyArray, "*batch latent"],
+    ) -> Float[AnyArray, "*batch field"]:
         """Predicted fields of the next state, scaled as the encoder's."""
         inputs = jnp.concatenate([state, action, jax.lax.stop_gradient(latent)], axis=-1)
         return state + self.state_head(inputs)
 
-    def reward(
-        self, next_state: Float[Array, "*batch field"], latent: Float[Array, "*batch latent"]
-    ) -> Gaussian:
+    def reward(self, next_state: Float[AnyArray, "*batch field"], latent: Float[AnyArray, "*batch latent"]) -> Gaussian:
         """Predicted reward, in units of the reward scale, and how sure the decoder is of it."""
         distance = jnp.abs(next_state - self.reference(latent))
         mean = -jnp.sum(jax.nn.softplus(self.weights(latent)) * distance, axis=-1)

@@ -3,10 +3,10 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int, PRNGKeyArray
+from jaxtyping import Float, Int, PRNGKeyArray
 
 from rebody.nn import GRU, MLP
-from rebody.types import DECISION_DT, Belief, Transition
+from rebody.types import DECISION_DT, AnyArray, Belief, Transition
 
 VARIANCE_RANGE = (1e-6, 4.0)
 
@@ -18,9 +18,9 @@ class EncoderCarry(eqx.Module):
     batched cell step a decision, and no window has to be stored.
     """
 
-    hidden: Float[Array, "*batch window units"]
-    last: Float[Array, "*batch feature"]  # features of the newest transition
-    ticks: Int[Array, ""]
+    hidden: Float[AnyArray, "*batch window units"]
+    last: Float[AnyArray, "*batch feature"]  # features of the newest transition
+    ticks: Int[AnyArray, ""]
 
 
 class Encoder(eqx.Module):
@@ -101,11 +101,11 @@ class Encoder(eqx.Module):
         _, hidden = jax.lax.scan(step, start, inputs)
         return self.belief(jnp.moveaxis(hidden, 0, -2), features)
 
-    def _embed(self, features: Float[Array, "*batch feature"], last: Float[Array, "*batch feature"]):
+    def _embed(self, features: Float[AnyArray, "*batch feature"], last: Float[AnyArray, "*batch feature"]):
         """Features and their change since the transition before: does the reward rise or fall?"""
         return self.embed(jnp.concatenate([features, (features - last) / DECISION_DT], axis=-1))
 
-    def features(self, transition: Transition) -> Float[Array, "*batch feature"]:
+    def features(self, transition: Transition) -> Float[AnyArray, "*batch feature"]:
         """Where it is, how it moved, and the reward, once more compressed so that small ones show."""
         scales = jnp.asarray(self.scales)
         state = transition.state.select(self.fields) / scales
@@ -114,7 +114,7 @@ class Encoder(eqx.Module):
         rewards = jnp.stack([reward, 0.3 * jnp.arcsinh(50 * reward)], axis=-1)
         return jnp.concatenate([state, change, rewards], axis=-1)
 
-    def belief(self, hidden: Float[Array, "*batch units"], features: Float[Array, "*batch feature"]) -> Belief:
+    def belief(self, hidden: Float[AnyArray, "*batch units"], features: Float[AnyArray, "*batch feature"]) -> Belief:
         """Read a belief from a recurrent state and the newest transition's features."""
         mean, raw = jnp.split(self.head(jnp.concatenate([hidden, features], axis=-1)), 2, axis=-1)
         gates = self.gate(hidden).reshape(*hidden.shape[:-1], self.latent, features.shape[-1])

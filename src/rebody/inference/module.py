@@ -104,7 +104,7 @@ def loss(
     return reconstruction + config.kl_weight * kl, metrics
 
 
-def _beside(x: Float[Array, "batch decoded n"], shape: tuple[int, ...]) -> Float[Array, "batch time decoded n"]:
+def _beside(x: Float[AnyArray, "batch decoded n"], shape: tuple[int, ...]) -> Float[AnyArray, "batch time decoded n"]:
     return jnp.broadcast_to(x[:, None], (*shape, x.shape[-1]))
 
 

@@ -3,18 +3,20 @@
 from typing import Protocol
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from rebody.types import Belief
+from rebody.types import AnyArray, Belief
 
 
 class Prior(Protocol):
     """KL(q(z) || p(z)) of each belief [nats]."""
 
-    def __call__(self, belief: Belief) -> Float[Array, "*batch"]: ...
+    def __call__(self, belief: Belief) -> Float[AnyArray, "*batch"]:
+        """KL of each belief [nats]."""
+        ...
 
 
-def unit_gaussian(belief: Belief) -> Float[Array, "*batch"]:
+def unit_gaussian(belief: Belief) -> Float[AnyArray, "*batch"]:
     """KL to N(0, I)."""
     variance = belief.variance
     return 0.5 * jnp.sum(variance + belief.mean**2 - 1.0 - jnp.log(variance), axis=-1)

@@ -3,16 +3,18 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Float, PRNGKeyArray
+
+from rebody.types import AnyArray
 
 
 class GRU(eqx.Module):
     """One cell: (hidden, input) -> hidden; hidden stays in [-1, 1]."""
 
-    from_input: Float[Array, "inputs gates"]
-    from_hidden: Float[Array, "units gates"]
-    bias: Float[Array, " gates"]
-    candidate_bias: Float[Array, " units"]
+    from_input: Float[AnyArray, "inputs gates"]
+    from_hidden: Float[AnyArray, "units gates"]
+    bias: Float[AnyArray, " gates"]
+    candidate_bias: Float[AnyArray, " units"]
 
     def __init__(self, inputs: int, units: int, *, key: PRNGKeyArray):
         input_key, hidden_key = jax.random.split(key)
@@ -28,8 +30,8 @@ class GRU(eqx.Module):
         return self.from_hidden.shape[0]
 
     def __call__(
-        self, hidden: Float[Array, "*batch units"], inputs: Float[Array, "*batch inputs"]
-    ) -> Float[Array, "*batch units"]:
+        self, hidden: Float[AnyArray, "*batch units"], inputs: Float[AnyArray, "*batch inputs"]
+    ) -> Float[AnyArray, "*batch units"]:
         """The next hidden state."""
         reset_in, update_in, candidate_in = jnp.split(inputs @ self.from_input + self.bias, 3, axis=-1)
         reset_h, update_h, candidate_h = jnp.split(hidden @ self.from_hidden, 3, axis=-1)

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Float, PRNGKeyArray
+
+from rebody.types import AnyArray
 
 
 class MLP(eqx.Module):
@@ -15,8 +17,8 @@ class MLP(eqx.Module):
     XLA's CPU back end is fastest there.
     """
 
-    weights: tuple[Float[Array, "inputs outputs"], ...]
-    biases: tuple[Float[Array, " outputs"], ...]
+    weights: tuple[Float[AnyArray, "inputs outputs"], ...]
+    biases: tuple[Float[AnyArray, " outputs"], ...]
     layer_norm: bool = eqx.field(static=True)
 
     def __init__(
@@ -40,7 +42,7 @@ class MLP(eqx.Module):
         self.biases = tuple(jnp.zeros(m) for m in sizes[1:])
         self.layer_norm = layer_norm
 
-    def __call__(self, x: Float[Array, "*batch inputs"]) -> Float[Array, "*batch outputs"]:
+    def __call__(self, x: Float[AnyArray, "*batch inputs"]) -> Float[AnyArray, "*batch outputs"]:
         """The last layer's outputs, unbounded."""
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             x = x @ weight + bias
@@ -50,6 +52,6 @@ class MLP(eqx.Module):
         return x @ self.weights[-1] + self.biases[-1]
 
 
-def _standardise(x: Float[Array, "*batch units"]) -> Float[Array, "*batch units"]:
+def _standardise(x: Float[AnyArray, "*batch units"]) -> Float[AnyArray, "*batch units"]:
     centred = x - x.mean(-1, keepdims=True)
     return centred * jax.lax.rsqrt(jnp.mean(centred**2, -1, keepdims=True) + 1e-5)

@@ -3,7 +3,9 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Float, PRNGKeyArray
+
+from rebody.types import AnyArray
 
 SHARPNESS = (3.0, 12.0, 50.0)
 
@@ -15,7 +17,7 @@ class MultiScale(eqx.Module):
     many updates to be precise near zero, one that sees tanh(50 u) of a learned difference u few.
     """
 
-    projection: Float[Array, "inputs projections"]
+    projection: Float[AnyArray, "inputs projections"]
 
     def __init__(self, inputs: int, projections: int, *, key: PRNGKeyArray):
         self.projection = jax.random.normal(key, (inputs, projections)) * inputs**-0.5
@@ -26,6 +28,7 @@ class MultiScale(eqx.Module):
         inputs, projections = self.projection.shape
         return inputs + len(SHARPNESS) * projections
 
-    def __call__(self, x: Float[Array, "*batch inputs"]) -> Float[Array, "*batch outputs"]:
+    def __call__(self, x: Float[AnyArray, "*batch inputs"]) -> Float[AnyArray, "*batch outputs"]:
+        """Inputs, then their squashed projections."""
         u = x @ self.projection
         return jnp.concatenate([x, *(jnp.tanh(sharpness * u) for sharpness in SHARPNESS)], axis=-1)

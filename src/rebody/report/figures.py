@@ -4,6 +4,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 
 from rebody.evaluation.results import EpisodeResult, Results
 from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TASKS, TRUTH, figure
@@ -32,7 +33,7 @@ def plot_episode(episode: EpisodeResult, path: Path) -> None:
         latents.set(ylabel="latent mean", xlabel="time [s]")
 
 
-def draw_progress(axes: plt.Axes, episode: EpisodeResult, until: int | None = None) -> None:
+def draw_progress(axes: Axes, episode: EpisodeResult, until: int | None = None) -> None:
     """Reached, believed and true value over time, up to a decision."""
     unit = _unit(episode.active_family[-1])
     reached = episode.position_m if episode.active_family[-1] == "goal" else episode.velocity_m_s
@@ -50,7 +51,7 @@ def draw_progress(axes: plt.Axes, episode: EpisodeResult, until: int | None = No
     axes.legend(loc="lower right", frameon=False, fontsize=8)
 
 
-def _trajectories(axes: plt.Axes, results: Results) -> None:
+def _trajectories(axes: Axes, results: Results) -> None:
     largest = max(abs(e.active_target[-1]) for e in results.episodes)
     for episode in results.episodes:
         colour = plt.get_cmap(TASKS)(0.5 + 0.5 * episode.active_target[-1] / largest)
@@ -61,7 +62,7 @@ def _trajectories(axes: plt.Axes, results: Results) -> None:
     axes.set(xlabel="time [s]", ylabel=f"{family} [{_unit(family)}]", title="robot (lines), hidden targets (dots)")
 
 
-def _latents(axes: plt.Axes, results: Results) -> None:
+def _latents(axes: Axes, results: Results) -> None:
     targets = [episode.active_target[-1] for episode in results.episodes]
     final = np.array([episode.latent[-1] for episode in results.episodes])
     for dimension in range(final.shape[1]):
@@ -74,7 +75,7 @@ def _latents(axes: plt.Axes, results: Results) -> None:
     axes.legend(frameon=False)
 
 
-def _errors(axes: plt.Axes, agents: dict[str, Results]) -> None:
+def _errors(axes: Axes, agents: dict[str, Results]) -> None:
     colours = {"reuse": MOTION, "oracle": ORACLE, "idle": IDLE}
     for name, results in agents.items():
         errors = np.sort([max(episode.final_error, 1e-3) for episode in results.episodes])

@@ -7,8 +7,8 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
-from matplotlib.figure import Figure  # noqa: E402
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 
 TRUTH, BELIEF, MOTION, ORACLE, IDLE = "#222222", "#d1495b", "#2b6f9e", "#8a8a8a", "#c9a227"
 TASKS = "coolwarm"

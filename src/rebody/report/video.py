@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import imageio.v2 as imageio
+import imageio_ffmpeg
 import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -23,9 +23,7 @@ WIDTH, HEIGHT, PLOT_HEIGHT = 640, 320, 240
 FRAMES_PER_S = 20
 
 
-def film(
-    trial: Trial, spec: TaskSpec, path: Path, on_progress: Callable[[float], None] | None = None
-) -> EpisodeResult:
+def film(trial: Trial, spec: TaskSpec, path: Path, on_progress: Callable[[float], None] | None = None) -> EpisodeResult:
     """Run one episode and write it as an MP4 in real time; returns the episode.
 
     `on_progress` hears the finished share. RebodyError where nothing can be drawn.
@@ -40,11 +38,14 @@ def film(
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.stem}.new{path.suffix}")
     try:
-        with imageio.get_writer(unfinished, fps=FRAMES_PER_S, macro_block_size=1, quality=7) as writer:
-            for done, frame in _frames(trial.robot, poses, episode):
-                writer.append_data(frame)
-                if on_progress is not None:
-                    on_progress(done)
+        size = (WIDTH, HEIGHT + PLOT_HEIGHT)
+        writer = imageio_ffmpeg.write_frames(str(unfinished), size, fps=FRAMES_PER_S, macro_block_size=1)
+        writer.send(None)  # starts the generator
+        for done, frame in _frames(trial.robot, poses, episode):
+            writer.send(frame)
+            if on_progress is not None:
+                on_progress(done)
+        writer.close()
         os.replace(unfinished, path)
     finally:
         unfinished.unlink(missing_ok=True)

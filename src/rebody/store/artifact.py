@@ -235,6 +235,4 @@ def _parse_weights(data: bytes, path: Path) -> dict[str, np.ndarray]:
 
 
 def _damaged(path: Path) -> RebodyError:
-    return RebodyError(
-        f"{path} is damaged or was edited: it is not what was saved. Copy or make the artifact anew."
-    )
+    return RebodyError(f"{path} is damaged or was edited: it is not what was saved. Copy or make the artifact anew.")

@@ -51,9 +51,7 @@ def arrays_into_tree(template: Tree, arrays: Mapping[str, np.ndarray], what: str
             "Use the settings it was made with, or make it anew."
         )
     names = iter([name for name, _ in _named_arrays(template)])
-    return jax.tree_util.tree_map(
-        lambda leaf: _like(leaf, arrays[next(names)]) if _is_stored(leaf) else leaf, template
-    )
+    return jax.tree_util.tree_map(lambda leaf: _like(leaf, arrays[next(names)]) if _is_stored(leaf) else leaf, template)
 
 
 def tree_hash(tree: Any) -> str:
@@ -67,11 +65,7 @@ def tree_hash(tree: Any) -> str:
 
 def _named_arrays(tree: Any) -> list[tuple[str, Any]]:
     leaves = jax.tree_util.tree_flatten_with_path(tree)[0]
-    return [
-        (jax.tree_util.keystr(path, simple=True, separator="."), leaf)
-        for path, leaf in leaves
-        if _is_stored(leaf)
-    ]
+    return [(jax.tree_util.keystr(path, simple=True, separator="."), leaf) for path, leaf in leaves if _is_stored(leaf)]
 
 
 def _is_stored(leaf: Any) -> bool:

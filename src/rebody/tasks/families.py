@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from rebody.errors import RebodyError
 from rebody.types import AnyArray, GlobalState, Task
@@ -52,7 +52,7 @@ def family_index(name: str) -> int:
     raise RebodyError(f"unknown task family '{name}'{hint} Families are: {', '.join(names)}.")
 
 
-def reward(task: Task, state: GlobalState, form: RewardForm) -> Float[Array, "*batch"]:
+def reward(task: Task, state: GlobalState, form: RewardForm) -> Float[AnyArray, "*batch"]:
     """Reward of the decision that led to `state`: never a control cost, never an alive bonus."""
     achieved = jnp.stack([family.achieved(state) for family in FAMILIES], axis=-1)
     of_task = jnp.take_along_axis(achieved, task.family[..., None], axis=-1)[..., 0]

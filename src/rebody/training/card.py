@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import jax
-import jaxlib
 import mujoco
 
 from rebody import __version__
@@ -19,7 +18,7 @@ def card(title: str, what: str, run: Run, seed: int, figures: Mapping[str, str])
     """Markdown: what it is, the exact command and seed that made it, wall time, machine, figures."""
     command = shlex.join(["rebody", *sys.argv[1:]])
     machine = f"{os.cpu_count()} x {_processor()}, {platform.system()}, Python {platform.python_version()}"
-    versions = f"rebody {__version__}, JAX {jax.__version__}, jaxlib {jaxlib.__version__}, MuJoCo {mujoco.__version__}"
+    versions = f"rebody {__version__}, JAX {jax.__version__}, MuJoCo {mujoco.__version__}"
     rows = "\n".join(f"| {name} | {value} |" for name, value in figures.items())
     return (
         f"# {title}\n\n{what}\n\n"

@@ -14,7 +14,14 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from tensorboardX import SummaryWriter
 
 from rebody.errors import RebodyError
@@ -39,9 +46,7 @@ class Interrupted(Exception):
 class Run:
     """One training run in a folder."""
 
-    def __init__(
-        self, out: Path, settings: dict[str, Any], *, resume: bool = False, checkpoint_every_s: float = 120.0
-    ):
+    def __init__(self, out: Path, settings: dict[str, Any], *, resume: bool = False, checkpoint_every_s: float = 120.0):
         """`settings` identify the run: a checkpoint made with others is not resumed."""
         self.out = out
         self.settings = json.loads(json.dumps(settings))
@@ -76,19 +81,22 @@ class Run:
     ) -> State:
         """Take turns until `iterations` are done; Interrupted after Ctrl-C, RebodyError if a loss diverges."""
         begun, saved = time.monotonic() - self.wall_s, time.monotonic()
-        with self._progress(label, iterations, int(state.iteration)) as show, _interrupts() as interrupted:
-            with SummaryWriter(str(self.out / "events")) as writer:
-                while int(state.iteration) < iterations:
-                    state, metrics = iterate(state)
-                    _check_finite(metrics, self.out)
-                    self.wall_s = time.monotonic() - begun
-                    self._log(writer, metrics, int(state.iteration))
-                    show(int(state.iteration), metrics)
-                    if interrupted() or time.monotonic() - saved > self.checkpoint_every_s:
-                        self._save(state)
-                        saved = time.monotonic()
-                    if interrupted():
-                        raise Interrupted(f"stopped; go on with the same command and --resume ({self.out})")
+        with (
+            self._progress(label, iterations, int(state.iteration)) as show,
+            _interrupts() as interrupted,
+            SummaryWriter(str(self.out / "events")) as writer,
+        ):
+            while int(state.iteration) < iterations:
+                state, metrics = iterate(state)
+                _check_finite(metrics, self.out)
+                self.wall_s = time.monotonic() - begun
+                self._log(writer, metrics, int(state.iteration))
+                show(int(state.iteration), metrics)
+                if interrupted() or time.monotonic() - saved > self.checkpoint_every_s:
+                    self._save(state)
+                    saved = time.monotonic()
+                if interrupted():
+                    raise Interrupted(f"stopped; go on with the same command and --resume ({self.out})")
         self._save(state)
         return state
 
@@ -123,7 +131,9 @@ class Run:
                 nonlocal last_line
                 evaluation = {name: value for name, value in metrics.items() if name.startswith("evaluation/")}
                 note = "  ".join(f"{name.split('/')[1]} {value:.3g}" for name, value in evaluation.items())
-                progress.update(task, completed=iteration, **({"note": note} if note else {}))
+                progress.update(task, completed=iteration)
+                if note:
+                    progress.update(task, note=note)
                 # without a terminal (a log file) a line now and then says the same
                 if not console.is_terminal and (note or time.monotonic() - last_line > 30):
                     last_line = time.monotonic()

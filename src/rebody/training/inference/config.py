@@ -40,7 +40,7 @@ class MetaConfig:
     """Iterations at the start in which all toys wander and only inference learns."""
     joint_iterations: int = 38
     """Iterations after that in which inference and policy learn together."""
-    policy_iterations: int = 70
+    policy_iterations: int = 90
     """Iterations after that in which inference is frozen and the policy learns on."""
     inference_updates: int = 128
     """Updates of encoder and decoder in an iteration."""

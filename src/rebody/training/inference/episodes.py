@@ -3,7 +3,7 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, PRNGKeyArray
+from jaxtyping import Bool, Float, PRNGKeyArray
 
 from rebody.bodies.toys import Toy, ToyState, no_disturbance
 from rebody.control.high_level import policy_observation
@@ -11,10 +11,27 @@ from rebody.control.sac import Actor
 from rebody.inference import Encoder
 from rebody.tasks import reward
 from rebody.training.inference.config import MetaConfig
-from rebody.types import Belief, GlobalState, Transition
+from rebody.types import AnyArray, Belief, GlobalState, Transition
 
 TURN_PROBABILITY = 0.15
 """Chance per decision that a wandering toy changes its mind."""
+
+
+class Roles(eqx.Module):
+    """How each episode's toy acts; where neither holds it samples its policy."""
+
+    wanders: Bool[AnyArray, " episode"]  # holds random actions, to show the encoder what a policy would not
+    decides: Bool[AnyArray, " episode"]  # takes the most likely action, as it will when it is used
+
+
+def roles(episodes: int, all_wander: bool) -> Roles:
+    """A quarter of the episodes decides, a quarter wanders; all wander at first.
+
+    A toy that only ever sampled would keep moving by chance. Standing still beside its goal, where a window
+    soon forgets on which side it lies, would then be new to encoder and policy when they are used.
+    """
+    quarter = jnp.arange(episodes) * 4 // episodes
+    return Roles(wanders=(quarter == 3) | all_wander, decides=quarter == 0)
 
 
 class Episodes(eqx.Module):
@@ -22,8 +39,8 @@ class Episodes(eqx.Module):
 
     state: GlobalState  # [*groups, episode, time + 1]
     belief: Belief  # [*groups, episode, time + 1]
-    action: Float[Array, "*groups episode time action"]
-    reward: Float[Array, "*groups episode time"]
+    action: Float[AnyArray, "*groups episode time action"]
+    reward: Float[AnyArray, "*groups episode time"]
 
 
 @eqx.filter_jit
@@ -32,10 +49,10 @@ def collect(
     actor: Actor,
     toy: Toy,
     config: MetaConfig,
-    wanders: Bool[Array, " episode"],
+    roles: Roles,
     key: PRNGKeyArray,
 ) -> Episodes:
-    """Let toys act on hidden tasks by what they believe; those that wander hold random actions instead.
+    """Let toys act on hidden tasks by what they believe.
 
     The belief is always built from the running episode alone, never from stored ones.
     """
@@ -51,9 +68,10 @@ def collect(
         body, seen, carry, belief, held = walk
         action_key, step_key, noise_key, wander_key = jax.random.split(key, 4)
         observation = policy_observation(seen, belief, config.policy_fields, config.policy_scales)
-        action, _ = actor.sample(observation, action_key)
+        sampled, _ = actor.sample(observation, action_key)
         held = _wander(held, wander_key)
-        action = jnp.where(wanders[:, None], held, action)
+        action = jnp.where(roles.decides[:, None], actor(observation), sampled)
+        action = jnp.where(roles.wanders[:, None], held, action)
         body = toy.step(body, action, step_key)
         earned = reward(task, toy.observe(body), config.reward)
         now_seen = _observe(toy, body, config, noise_key)
@@ -100,7 +118,7 @@ def _random_start(toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> ToyState:
     return toy.initial(x, vx, disturbance)
 
 
-def _wander(held: Float[Array, "episode 1"], key: PRNGKeyArray) -> Float[Array, "episode 1"]:
+def _wander(held: Float[AnyArray, "episode 1"], key: PRNGKeyArray) -> Float[AnyArray, "episode 1"]:
     turn_key, action_key = jax.random.split(key)
     turns = jax.random.bernoulli(turn_key, TURN_PROBABILITY, held.shape)
     return jnp.where(turns, jax.random.uniform(action_key, held.shape, minval=-1.0), held)

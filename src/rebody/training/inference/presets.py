@@ -18,7 +18,12 @@ def position() -> MetaConfig:
         reward="plain",
         inference=InferenceConfig(fields=("x",), scales=(10.0,), reward_scale=10.0, latent=2),
         sac=SACConfig(
-            hidden=(128, 128), projections=8, discount=0.95, learning_rate=5e-4, decay_updates=55_000, huber=0.05
+            hidden=(128, 128),
+            projections=8,
+            discount=0.95,
+            learning_rate=5e-4,
+            decay_updates=65_000,
+            huber=0.05,
         ),
         policy_fields=("x", "vx"),
         policy_scales=(10.0, 3.5),

@@ -10,7 +10,7 @@ import numpy as np
 from rebody.agents.agent import ReuseAgent
 from rebody.agents.parts import InferenceParts
 from rebody.agents.rollout import Episodes, rollout_on_toy
-from rebody.bodies.toys import Disturbance, Toy, no_disturbance
+from rebody.bodies.toys import Disturbance, MassDamper, no_disturbance
 from rebody.control.high_level import HighLevelPolicy
 from rebody.control.sac import Actor
 from rebody.inference import InferenceModule
@@ -31,7 +31,7 @@ PROBED_FROM = 20
 """A probe is fitted on the beliefs from this decision on."""
 
 
-def measure(module: InferenceModule, actor: Actor, toy: Toy, config: MetaConfig) -> dict[str, float]:
+def measure(module: InferenceModule, actor: Actor, toy: MassDamper, config: MetaConfig) -> dict[str, float]:
     """Final error on held-out tasks [m, m/s], return, and R^2 of a linear reading of the target."""
     parts = _parts(module, actor, config)
     fitted = _rollout(parts, toy, config, seed=1)
@@ -39,7 +39,7 @@ def measure(module: InferenceModule, actor: Actor, toy: Toy, config: MetaConfig)
     figures = {}
     for name in config_families(config):
         of_family = np.flatnonzero(tasks.family == family_index(name))
-        errors = [final_error(name, tasks.target[i], episodes.state.x[:, i]) for i in of_family]
+        errors = [final_error(name, float(tasks.target[i]), np.asarray(episodes.state.x)[:, i]) for i in of_family]
         figures[f"{name} median"] = float(np.median(errors))
         figures[f"{name} p95"] = float(np.percentile(errors, 95))
     figures["return"] = float(episodes.reward.sum(0).mean())
@@ -50,7 +50,7 @@ def measure(module: InferenceModule, actor: Actor, toy: Toy, config: MetaConfig)
 
 
 def save_inference(
-    module: InferenceModule, actor: Actor, toy: Toy, config: MetaConfig, run: Run, seed: int, title: str
+    module: InferenceModule, actor: Actor, toy: MassDamper, config: MetaConfig, run: Run, seed: int, title: str
 ) -> Path:
     """Fit the probe, measure, write artifact and card."""
     parts = _parts(module, actor, config)
@@ -103,7 +103,7 @@ def _parts(module: InferenceModule, actor: Actor, config: MetaConfig) -> Inferen
 
 
 def _rollout(
-    parts: InferenceParts, toy: Toy, config: MetaConfig, seed: int, disturbed: bool = False
+    parts: InferenceParts, toy: MassDamper, config: MetaConfig, seed: int, disturbed: bool = False
 ) -> tuple[Task, Episodes]:
     """Held-out tasks and what the toy did on them; the seeds are none that training uses."""
     task_key, disturbance_key = jax.random.split(jax.random.fold_in(jax.random.key(2**31 - 1), seed))
@@ -125,6 +125,6 @@ def _rollout(
 
 
 def _fit(task: Task, episodes: Episodes) -> Probe:
-    latent = episodes.belief.mean[PROBED_FROM:]
+    latent = np.asarray(episodes.belief.mean)[PROBED_FROM:]
     repeated = jax.tree.map(lambda leaf: np.broadcast_to(leaf, latent.shape[:2]).ravel(), task)
     return fit_probe(latent.reshape(-1, latent.shape[-1]), repeated.family, repeated.target)

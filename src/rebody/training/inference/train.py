@@ -11,10 +11,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optax
-from jaxtyping import Array, Int, PRNGKeyArray
+from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import load_inference
-from rebody.bodies.toys import MassDamper, Toy
+from rebody.bodies.toys import MassDamper
 from rebody.control import sac
 from rebody.control.high_level import policy_observation
 from rebody.control.sac import SACBatch, SACState
@@ -22,7 +22,7 @@ from rebody.errors import RebodyError
 from rebody.inference.module import Evidence, InferenceModule, loss
 from rebody.inference.prior import unit_gaussian
 from rebody.training.inference.config import MetaConfig
-from rebody.training.inference.episodes import Episodes, collect, refresh_beliefs
+from rebody.training.inference.episodes import Episodes, collect, refresh_beliefs, roles
 from rebody.training.inference.report import measure, save_inference
 from rebody.training.run import Metrics, Run
 from rebody.types import Transition
@@ -43,7 +43,13 @@ class RunState(eqx.Module):
 
 
 def train_inference(
-    config: MetaConfig, out: Path, seed: int, *, title: str, resume: bool = False, init_from: str | None = None
+    config: MetaConfig,
+    out: Path,
+    seed: int,
+    *,
+    title: str,
+    resume: bool = False,
+    init_from: str | None = None,
 ) -> Path:
     """Train an inference module with its high-level policy; returns the artifact's folder.
 
@@ -56,15 +62,15 @@ def train_inference(
     return save_inference(state.module, state.sac.averaged_actor, toy, config, run, seed, title)
 
 
-def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
+def iterate(state: RunState, toy: MassDamper, config: MetaConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
     """One turn of the loop."""
     iteration = int(state.iteration)
     keys = jax.random.split(jax.random.fold_in(key, iteration), 3)
     module, optimiser, policy = state.module, state.optimiser, state.sac
     metrics = {}
 
-    wanders = jnp.arange(config.episodes) >= (0.75 if iteration >= config.wander_iterations else 0) * config.episodes
-    episodes = collect(module.encoder, policy.actor, toy, config, wanders, keys[0])
+    acting = roles(config.episodes, all_wander=iteration < config.wander_iterations)
+    episodes = collect(module.encoder, policy.actor, toy, config, acting, keys[0])
     replay, stored = store(state.replay, episodes, iteration)
     if iteration < config.inference_iterations:
         module, optimiser, metrics = update_inference(module, optimiser, replay, stored, config, keys[1])
@@ -80,7 +86,7 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
     return state, {name: float(value) for name, value in metrics.items()}
 
 
-def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: str | None = None) -> RunState:
+def initial_state(config: MetaConfig, toy: MassDamper, key: PRNGKeyArray, init_from: str | None = None) -> RunState:
     """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
     module = InferenceModule(config.inference, 1, module_key)
@@ -88,7 +94,7 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     if init_from is not None:
         module, policy = _take_over(init_from, module, policy)
     one_group = jax.eval_shape(
-        lambda: collect(module.encoder, policy.actor, toy, config, jnp.zeros(config.episodes, bool), key)
+        lambda: collect(module.encoder, policy.actor, toy, config, roles(config.episodes, True), key)
     )
     return RunState(
         module=module,
@@ -116,7 +122,9 @@ def store(replay: Episodes, episodes: Episodes, iteration: Int[Array, ""] | int)
 
 
 @eqx.filter_jit
-def update_inference(module, optimiser, replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray):
+def update_inference(
+    module: InferenceModule, optimiser: optax.OptState, replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray
+) -> tuple[InferenceModule, optax.OptState, dict[str, Float[Array, ""]]]:
     """Steps of encoder and decoder on windows of stored episodes."""
     arrays, static = eqx.partition(module, eqx.is_array)
 
@@ -129,7 +137,7 @@ def update_inference(module, optimiser, replay: Episodes, stored, config: MetaCo
             has_aux=True,
         )(arrays)
         updates, optimiser = _optimiser(config).update(gradient, optimiser)
-        return (optax.apply_updates(arrays, updates), optimiser), metrics
+        return (eqx.apply_updates(arrays, updates), optimiser), metrics
 
     keys = jax.random.split(key, config.inference_updates)
     (arrays, optimiser), metrics = jax.lax.scan(step, (arrays, optimiser), keys)
@@ -137,7 +145,9 @@ def update_inference(module, optimiser, replay: Episodes, stored, config: MetaCo
 
 
 @eqx.filter_jit
-def update_policy(policy: SACState, replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray):
+def update_policy(
+    policy: SACState, replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray
+) -> tuple[SACState, dict[str, Float[Array, ""]]]:
     """Steps of soft actor-critic on nominal episodes, with the beliefs held then."""
     arrays, static = eqx.partition(policy, eqx.is_array)
 

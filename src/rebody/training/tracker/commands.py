@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int, PRNGKeyArray
+from jaxtyping import Float, Int, PRNGKeyArray
 
 from rebody.bodies.toys import MassDamper, ToyState
 from rebody.control.tracker import Command
 from rebody.tasks import GOAL, VELOCITY
-from rebody.types import GlobalState, Subgoal, Task
+from rebody.types import AnyArray, GlobalState, Subgoal, Task
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class ToyGuide(eqx.Module):
     """A toy that a scripted policy drives to a hidden task, seen `horizon` decisions ahead of the robot."""
 
     task: Task
-    horizon: Int[Array, " robot"]
+    horizon: Int[AnyArray, " robot"]
 
     def subgoal(self, state: GlobalState, max_horizon: int) -> Subgoal:
         """Where the toy would be, from the robot's own state: the subgoals of `reuse` (thesis 5.6.2)."""
@@ -58,7 +58,7 @@ class ToyGuide(eqx.Module):
         return Subgoal(self.task.family, jnp.where(self.task.family == GOAL, ahead.x, ahead.drift))
 
 
-def _scripted_action(toy: MassDamper, state: ToyState, task: Task) -> Float[Array, "*batch 1"]:
+def _scripted_action(toy: MassDamper, state: ToyState, task: Task) -> Float[AnyArray, "*batch 1"]:
     """Full force towards a goal until braking is due, or the force that brings the speed at once."""
     braked = state.x + state.drift * toy.mass / toy.damping
     speed = jnp.where(task.family == GOAL, 10.0 * (task.target - braked), task.target)

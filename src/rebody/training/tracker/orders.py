@@ -5,14 +5,14 @@ from functools import partial
 import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
 from rebody.bodies import RobotBatch
 from rebody.control.tracker import Command
 from rebody.tasks import GOAL
 from rebody.training.tracker.commands import ToyGuide
 from rebody.training.tracker.config import TrackerConfig
-from rebody.types import GlobalState, Task
+from rebody.types import AnyArray, GlobalState, Task
 
 
 class Orders(eqx.Module):
@@ -80,5 +80,5 @@ def _draw(key: PRNGKeyArray, config: TrackerConfig) -> Command:
 
 
 @partial(jax.jit, static_argnames="max_horizon")
-def _guided_value(guide: ToyGuide, state: GlobalState, max_horizon: int) -> Float[Array, " robot"]:
+def _guided_value(guide: ToyGuide, state: GlobalState, max_horizon: int) -> Float[AnyArray, " robot"]:
     return guide.subgoal(state, max_horizon).value

@@ -33,9 +33,9 @@ def measure(tracker: Tracker, spec: RobotSpec) -> dict[str, float]:
     slot = np.repeat([GOAL, VELOCITY, GOAL, VELOCITY], [COMMANDS, COMMANDS, len(zeros), len(zeros)])
     value = np.concatenate([goals, speeds, zeros, zeros])
     position, fell = _run(tracker, spec, slot.astype(np.int32), value.astype(np.float32))
-    errors = np.array(
-        [final_error(SLOTS[slot[i]], value[i], position[:, i]) for i in range(2 * COMMANDS)]
-    ).reshape(2, COMMANDS)
+    errors = np.array([final_error(SLOTS[slot[i]], value[i], position[:, i]) for i in range(2 * COMMANDS)]).reshape(
+        2, COMMANDS
+    )
     last_second = np.diff(position[-11:, 2 * COMMANDS :], axis=0) / 0.1
     return {
         "goal median": float(np.median(errors[0])),

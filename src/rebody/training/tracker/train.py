@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import load_tracker
-from rebody.bodies import RobotBatch, RobotSpec, load_robot
+from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.tracker import Command, Tracker, tracker_observation, tracker_reward
@@ -54,7 +54,13 @@ class RunState(eqx.Module):
 
 
 def train_tracker(
-    robot: str, config: TrackerConfig, out: Path, seed: int, *, resume: bool = False, init_from: str | None = None
+    robot: str,
+    config: TrackerConfig,
+    out: Path,
+    seed: int,
+    *,
+    resume: bool = False,
+    init_from: str | None = None,
 ) -> Path:
     """Train a tracker; returns the artifact's folder.
 
@@ -171,7 +177,12 @@ def relabel(transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, contr
         observation=tracker_observation(transitions.joints, command, *limits),
         action=transitions.action,
         reward=tracker_reward(
-            command, transitions.displacement, control_dt, transitions.pitch, transitions.action, config.reward
+            command,
+            transitions.displacement,
+            control_dt,
+            transitions.pitch,
+            transitions.action,
+            config.reward,
         ),
         next_observation=tracker_observation(transitions.next_joints, later, *limits),
         terminal=jnp.zeros(size),
