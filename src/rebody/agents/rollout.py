@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from rebody.agents.agent import Agent, Carry, Observation, relative
+from rebody.agents.agent import Command as AgentCommand
 from rebody.bodies.robot import RobotBatch, RobotSpec
 from rebody.bodies.toys import Disturbance, Toy
 from rebody.control.tracker import Command, Tracker
@@ -37,7 +38,7 @@ def rollout_on_toy(
     body = toy.initial(still, still, disturbance)
     carry, command = agent.begin(toy.observe(body))
 
-    def decide(walk, inputs):
+    def advance(walk, inputs):
         body, carry, command = walk
         task, key = inputs
         body = toy.step(body, command.action, key)
@@ -47,7 +48,7 @@ def rollout_on_toy(
         return (body, carry, following), (state, earned, carry.belief, command.subgoal)
 
     keys = jax.random.split(jax.random.key(0), len(tasks.target))
-    _, (state, earned, belief, subgoal) = jax.lax.scan(decide, (body, carry, command), (tasks, keys))
+    _, (state, earned, belief, subgoal) = jax.lax.scan(advance, (body, carry, command), (tasks, keys))
     return Episodes(state, earned, belief, subgoal, still > 0)
 
 
@@ -69,7 +70,7 @@ def rollout_on_robot(
     for episode, seed in enumerate(seeds):
         batch.reset(np.random.default_rng(seed), np.arange(size) == episode)
     previous = batch.qpos.copy()
-    carry, command = _begin(agent, spec.observe(batch.qpos, previous))
+    carry, command = begin(agent, spec.observe(batch.qpos, previous))
     fell, records = np.zeros(size, bool), []
     for i in range(decisions):
         for _ in range(spec.steps_per_decision):
@@ -80,7 +81,8 @@ def rollout_on_robot(
         state = spec.observe(batch.qpos, previous)
         previous = batch.qpos.copy()
         task = jax.tree.map(lambda field, i=i: field[i], tasks)
-        carry, following, earned = _decide(agent, carry, state, task, form)
+        earned = task_reward(task, state, form)
+        carry, following = decide(agent, carry, Observation(state, earned))
         records.append((state, earned, carry.belief, command.subgoal))
         command = following
     stacked = jax.tree.map(lambda *steps: np.stack(steps), *records)
@@ -92,21 +94,33 @@ def follow(tracker: Tracker, batch: RobotBatch, subgoal: Subgoal) -> None:
     """One control step towards a subgoal, made relative to where each robot is now."""
     spec = batch.spec
     joints = spec.joint_state(batch.qpos, batch.qvel)
-    batch.step(np.asarray(_track(tracker, joints, subgoal, batch.x.astype(np.float32))))
+    batch.step(np.asarray(track(tracker, joints, subgoal, batch.x.astype(np.float32))))
 
 
 @eqx.filter_jit
-def _track(tracker: Tracker, joints, subgoal: Subgoal, x) -> Float[AnyArray, "episode action"]:
+def track(
+    tracker: Tracker,
+    joints: Float[AnyArray, "*episode joint"],
+    subgoal: Subgoal,
+    x: Float[AnyArray, "*episode"],
+) -> Float[AnyArray, "*episode action"]:
+    """Joint actions towards a subgoal from x [m]."""
     return tracker(joints, Command(subgoal.slot, relative(subgoal, x)))
 
 
 @eqx.filter_jit
-def _begin(agent: Agent, state: GlobalState):
+def begin(agent: Agent, state: GlobalState) -> tuple[Carry, AgentCommand]:
+    """`Agent.begin`, compiled."""
     return agent.begin(state)
 
 
 @eqx.filter_jit
-def _decide(agent: Agent, carry: Carry, state: GlobalState, task: Task, form: RewardForm):
-    earned = reward(task, state, form)
-    carry, command = agent.decide(carry, Observation(state, earned))
-    return carry, command, earned
+def decide(agent: Agent, carry: Carry, observation: Observation) -> tuple[Carry, AgentCommand]:
+    """`Agent.decide`, compiled."""
+    return agent.decide(carry, observation)
+
+
+@eqx.filter_jit
+def task_reward(task: Task, state: GlobalState, form: RewardForm) -> Float[AnyArray, "*episode"]:
+    """`rebody.tasks.reward`, compiled."""
+    return reward(task, state, form)

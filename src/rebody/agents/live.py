@@ -1,0 +1,80 @@
+"""An agent for one robot, driven from outside: observation and reward in, joint action out."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from rebody.agents.agent import Observation
+from rebody.agents.parts import HORIZON, Inference, LoadedTracker, build_agent, check_fit, load_inference, load_tracker
+from rebody.agents.rollout import begin, decide, track
+from rebody.bodies import RobotSpec, load_robot
+from rebody.errors import RebodyError
+from rebody.tasks import FAMILIES
+from rebody.types import Belief, Subgoal
+
+
+class LiveAgent:
+    """`reuse` on one robot, step by step; see `load_agent`."""
+
+    def __init__(self, spec: RobotSpec, inference: Inference, tracker: LoadedTracker, horizon: int = HORIZON):
+        """RebodyError if the module does not fit the robot."""
+        check_fit(inference, spec.name, spec.moving_fields)
+        self._spec, self._inference, self._tracker = spec, inference, tracker.tracker
+        self._agent = build_agent("reuse", inference, horizon=horizon)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: a new episode begins with the next step."""
+        self._steps = 0
+
+    def step(self, observation: Float[np.ndarray, " observation"], reward: float) -> Float[np.ndarray, " action"]:
+        """Joint action in [-1, 1] for one control step.
+
+        `observation` is qpos with x, then qvel; `reward` is the task's, of the step that led here (ignored at
+        the first). Every 0.1 s the agent takes in a transition and decides anew.
+        """
+        model = self._spec.model
+        if np.shape(observation) != (model.nq + model.nv,):
+            raise RebodyError(
+                f"'{self._spec.name}' observes {model.nq + model.nv} numbers (qpos with x, then qvel), "
+                f"got shape {np.shape(observation)}."
+            )
+        qpos, qvel = np.split(np.asarray(observation, float), [model.nq])
+        if self._steps % self._spec.steps_per_decision == 0:
+            self._decide(qpos, reward)
+        self._steps += 1
+        x = np.asarray(qpos[self._spec.root_addresses[0]], np.float32)
+        return np.asarray(track(self._tracker, self._spec.joint_state(qpos, qvel), self._command.subgoal, x))
+
+    @property
+    def belief(self) -> Belief:
+        """Mean and variance of the latent; shapes [latent]."""
+        return jax.tree.map(np.asarray, self._carry.belief)
+
+    @property
+    def inferred(self) -> tuple[str, float]:
+        """Family and target [m, m/s] that a linear probe reads from the belief; the agent does not use it."""
+        family, target = self._inference.parts.probe(self._carry.belief)
+        return FAMILIES[int(family)].name, float(target)
+
+    @property
+    def subgoal(self) -> Subgoal:
+        """What the tracker is after: a goal is a point in the world."""
+        return jax.tree.map(np.asarray, self._command.subgoal)
+
+    def _decide(self, qpos: Float[np.ndarray, " nq"], reward: float) -> None:
+        if self._steps == 0:
+            self._carry, self._command = begin(self._agent, self._spec.observe(qpos, qpos))
+        else:
+            state = self._spec.observe(qpos, self._previous_qpos)
+            observation = Observation(state, jnp.asarray(reward, jnp.float32))
+            self._carry, self._command = decide(self._agent, self._carry, observation)
+        self._previous_qpos = qpos
+
+
+def load_agent(
+    robot: str = "cheetah", inference: str = "position", tracker: str | None = None, horizon: int = HORIZON
+) -> LiveAgent:
+    """An agent of shipped or own artifacts, ready to `step`; RebodyError if they do not fit together."""
+    return LiveAgent(load_robot(robot), load_inference(inference), load_tracker(tracker or f"tracker-{robot}"), horizon)
