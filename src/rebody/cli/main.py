@@ -3,12 +3,14 @@
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
 
 from rebody.errors import RebodyError
+
+DESCRIPTION = "Learn to infer a task once, on a point mass; reuse that module, frozen, on any robot."
 
 
 def main() -> None:
@@ -35,27 +37,23 @@ def run(arguments: list[str]) -> int:
     return 0
 
 
-def parse(arguments: list[str]):
+def parse(arguments: list[str]) -> Any:
     """The command with its options; prints help or usage and exits where tyro does."""
     from rebody.cli.demo import Demo
     from rebody.cli.evaluate import Evaluate
     from rebody.cli.listing import List
     from rebody.cli.run import RunTask
-    from rebody.cli.train import TrainInference, TrainTracker, train_inference_default
+    from rebody.cli.train import train_command
 
-    commands = (
+    train: Any = Annotated[train_command(arguments), tyro.conf.subcommand("train")]
+    commands: Any = (
         Annotated[Demo, tyro.conf.subcommand("demo")]
         | Annotated[RunTask, tyro.conf.subcommand("run")]
-        | Annotated[List, tyro.conf.subcommand("list")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+        | train
+        | Annotated[List, tyro.conf.subcommand("list")]
     )
-    if arguments[:1] == ["train"]:
-        commands = (
-            Annotated[TrainInference, tyro.conf.subcommand("inference", default=train_inference_default(arguments))]
-            | Annotated[TrainTracker, tyro.conf.subcommand("tracker")]
-        )
-        return tyro.cli(commands, prog="rebody train", args=arguments[1:])
-    return tyro.cli(commands, prog="rebody", args=arguments)
+    return tyro.cli(commands, prog="rebody", args=arguments, description=DESCRIPTION)
 
 
 def _plain(message: object) -> str:

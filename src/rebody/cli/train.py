@@ -1,8 +1,8 @@
 """`rebody train`: every shipped artifact is made by these commands."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
@@ -61,17 +61,34 @@ class TrainTracker:
         _show_card(folder)
 
 
-def train_inference_default(arguments: list[str]) -> TrainInference:
-    """Defaults of the preset that a command line names; RebodyError if there is none of that name."""
-    name = TrainInference.preset
+def train_command(arguments: list[str]) -> type:
+    """The type of `rebody train`, its defaults those of the preset that the command line names.
+
+    RebodyError if there is no preset of that name.
+    """
+    preset = _wanted_preset(arguments)
+    if preset not in PRESETS:
+        raise RebodyError(f"unknown preset '{preset}'. Presets are: {', '.join(PRESETS)}.")
+    default = TrainInference(config=PRESETS[preset](), preset=preset)
+    # made here, since the defaults are known only now
+    inference: Any = Annotated[TrainInference, tyro.conf.subcommand("inference", default=default, prefix_name=False)]
+    tracker: Any = Annotated[TrainTracker, tyro.conf.subcommand("tracker", prefix_name=False)]
+    command: Any = Annotated[inference | tracker, tyro.conf.arg(name="")]
+    doc = "Train a part; every shipped artifact is made by these commands."
+    return make_dataclass("Train", [("command", command)], frozen=True, namespace={"run": _run, "__doc__": doc})
+
+
+def _run(train: Any) -> None:
+    train.command.run()
+
+
+def _wanted_preset(arguments: list[str]) -> str:
     for i, argument in enumerate(arguments):
         if argument == "--preset" and i + 1 < len(arguments):
-            name = arguments[i + 1]
-        elif argument.startswith("--preset="):
-            name = argument.removeprefix("--preset=")
-    if name not in PRESETS:
-        raise RebodyError(f"unknown preset '{name}'. Presets are: {', '.join(PRESETS)}.")
-    return TrainInference(config=PRESETS[name](), preset=name)
+            return arguments[i + 1]
+        if argument.startswith("--preset="):
+            return argument.removeprefix("--preset=")
+    return TrainInference.preset
 
 
 def _show_card(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""Tables for the terminal and for Markdown."""
+"""Tables for the terminal."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,39 +8,41 @@ from rich.table import Table
 from rebody.evaluation.results import Results
 from rebody.tasks import FAMILIES
 
-COLUMNS = (
+FIGURES = (
     ("median error", "median_error"),
     ("95th percentile", "p95_error"),
     ("within tolerance", "within_tolerance"),
-    ("ripple m/s", "ripple"),
+    ("ripple [m/s]", "ripple"),
 )
+"""Of each family: what it is called, and where it stands in the summary."""
+SHARES = ("within_tolerance", "fell")
 
 
 def summary_table(results: Sequence[Results]) -> Table:
-    """One row per evaluation and family, each figure with its 95 % interval."""
-    table = Table(caption="value [95 % bootstrap interval over episodes]", caption_justify="left")
-    for column in ("robot", "agent", "family", "episodes", *(name for name, _ in COLUMNS), "fell", "regret"):
-        table.add_column(column, justify="left" if column in ("robot", "agent", "family") else "right")
+    """A column per evaluation, a row per figure, each with its 95 % interval."""
+    summaries = [result.summary for result in results]
+    table = Table(caption=r"value \[95 % bootstrap interval over episodes]", caption_justify="left")
+    table.add_column("")
     for result in results:
-        summary = result.summary
-        for family, figures in summary["families"].items():
-            unit = next(f.unit for f in FAMILIES if f.name == family)
-            table.add_row(
-                result.robot,
-                result.agent,
-                f"{family} [{unit}]".replace("[", r"\["),
-                str(figures["episodes"]),
-                *(_with_interval(figures[key], percent=key == "within_tolerance") for _, key in COLUMNS),
-                _with_interval(summary["fell"], percent=True),
-                _with_interval(summary["regret"]),
-            )
+        table.add_column(f"{result.robot}, {result.agent}", justify="right")
+    for family in FAMILIES:
+        if not any(family.name in summary["families"] for summary in summaries):
+            continue
+        ofs = [summary["families"].get(family.name, {}) for summary in summaries]
+        table.add_row(f"{family.name}: episodes", *(str(of.get("episodes", 0)) for of in ofs))
+        for name, key in FIGURES:
+            unit = rf" \[{family.unit}]" if key.endswith("_error") else ""
+            table.add_row(f"{family.name}: {name}{unit}", *(_cell(key, of.get(key)) for of in ofs))
+    for key in ("fell", "regret"):
+        table.add_row(key, *(_cell(key, summary[key]) for summary in summaries))
     return table
 
 
-def _with_interval(figure: dict[str, Any] | None, *, percent: bool = False) -> str:
+def _cell(key: str, figure: dict[str, Any] | None) -> str:
     if figure is None:
         return "-"
-    show = (lambda x: f"{100 * x:.1f} %") if percent else (lambda x: f"{x:.3f}")
-    if figure["low"] == figure["high"]:
-        return show(figure["value"])
-    return f"{show(figure['value'])} \\[{show(figure['low'])}, {show(figure['high'])}]"
+    value, low, high = (
+        f"{100 * figure[end]:.1f}" if key in SHARES else f"{figure[end]:.3f}" for end in ("value", "low", "high")
+    )
+    interval = "" if low == high else rf" \[{low}, {high}]"
+    return f"{value}{interval}" + (" %" if key in SHARES else "")
