@@ -48,22 +48,23 @@ class Agent(eqx.Module):
         """The first decision of an episode, when nothing is known."""
         shape = state.x.shape
         belief = self.encoder.prior(shape)
-        command = self.command(state, belief)
-        carry = Carry(self.encoder.initial(shape), belief, state, command, jnp.ones((), jnp.int32))
+        first = jnp.zeros((), jnp.int32)
+        command = self.command(state, belief, first)
+        carry = Carry(self.encoder.initial(shape), belief, state, command, first + 1)
         return carry, command
 
     def decide(self, carry: Carry, observation: Observation) -> tuple[Carry, Command]:
         """Take in the transition since the last decision; speak anew at every `stride`-th."""
         transition = Transition(carry.previous, observation.reward, observation.state)
         encoder, belief = self.encoder.step(carry.encoder, transition)
-        fresh = self.command(observation.state, belief)
+        fresh = self.command(observation.state, belief, carry.decisions)
         speaks = carry.decisions % self.stride == 0
         command = jax.tree.map(lambda new, held: jnp.where(speaks, new, held), fresh, carry.command)
         return Carry(encoder, belief, observation.state, command, carry.decisions + 1), command
 
     @abstractmethod
-    def command(self, state: GlobalState, belief: Belief) -> Command:
-        """What to do in this state, believing this."""
+    def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
+        """What to do in this state, believing this, at this decision of the episode (the first is 0)."""
 
 
 class ReuseAgent(Agent):
@@ -74,7 +75,7 @@ class ReuseAgent(Agent):
     family: int = eqx.field(static=True)
     horizon: int = eqx.field(static=True)
 
-    def command(self, state: GlobalState, belief: Belief) -> Command:
+    def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """The policy's action for a toy; for a robot, where that policy would lead a toy from here."""
         action = self.high_level(state, belief)
         ahead = self.imagine(state, belief)
@@ -96,17 +97,18 @@ class ReuseAgent(Agent):
 class OracleAgent(Agent):
     """Told the task: its target is the subgoal. The encoder only listens."""
 
-    task: Task
+    tasks: Task  # the active ones, [time, episode]
 
-    def command(self, state: GlobalState, belief: Belief) -> Command:
-        """The true target."""
-        return Command(jnp.zeros((*state.x.shape, 1)), Subgoal(self.task.family, self.task.target))
+    def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
+        """The target that is active now."""
+        active = jax.tree.map(lambda field: jnp.take(field, decision, axis=0, mode="clip"), self.tasks)
+        return Command(jnp.zeros((*state.x.shape, 1)), Subgoal(active.family, active.target))
 
 
 class IdleAgent(Agent):
     """Knows nothing and stands still: what a robot without inference would get."""
 
-    def command(self, state: GlobalState, belief: Belief) -> Command:
+    def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """A speed of zero."""
         still = Subgoal(jnp.full(state.x.shape, VELOCITY), jnp.zeros_like(state.x))
         return Command(jnp.zeros((*state.x.shape, 1)), still)

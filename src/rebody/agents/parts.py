@@ -94,7 +94,7 @@ def check_fit(inference: Inference, robot: str, moving_fields: tuple[str, ...]) 
 def build_agent(
     kind: str, inference: Inference, tasks: Task | None = None, *, stride: int = 1, horizon: int = HORIZON
 ) -> Agent:
-    """An agent of a named kind; `oracle` needs the tasks, [episode]."""
+    """An agent of a named kind; `oracle` needs the tasks, the active ones [time, episode]."""
     encoder = inference.parts.module.encoder
     match kind:
         case "reuse":
@@ -108,7 +108,7 @@ def build_agent(
             )
         case "oracle" if tasks is not None:
             family, target = jnp.asarray(tasks.family), jnp.asarray(tasks.target)
-            return OracleAgent(encoder=encoder, stride=stride, task=Task(family, target))
+            return OracleAgent(encoder=encoder, stride=stride, tasks=Task(family, target))
         case "idle":
             return IdleAgent(encoder=encoder, stride=stride)
     raise RebodyError(f"unknown agent '{kind}'. Agents are: reuse, oracle, idle.")

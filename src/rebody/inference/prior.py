@@ -1,6 +1,6 @@
 """Priors over the latent: a function (mean, variance) -> KL divergence, passed to the loss (thesis 5.6)."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import jax.numpy as jnp
 from jaxtyping import Float
@@ -8,6 +8,7 @@ from jaxtyping import Float
 from rebody.types import AnyArray, Belief
 
 
+@runtime_checkable  # so that annotations can be checked
 class Prior(Protocol):
     """KL(q(z) || p(z)) of each belief [nats]."""
 

@@ -2,6 +2,7 @@
 
 import io
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from jaxtyping import Float, UInt8
 from PIL import Image
 
 from rebody.bodies import RobotBatch, RobotSpec
-from rebody.bodies.camera import Camera
+from rebody.bodies.camera import Camera, Pole
 from rebody.evaluation.evaluate import Trial, evaluate
 from rebody.evaluation.results import EpisodeResult
 from rebody.report.figures import draw_progress
@@ -21,6 +22,7 @@ from rebody.tasks.task_file import TaskSpec
 
 WIDTH, HEIGHT, PLOT_HEIGHT = 640, 320, 240
 FRAMES_PER_S = 20
+TRUTH_POLE, BELIEF_POLE = (0.1, 0.1, 0.1, 1.0), (0.82, 0.29, 0.36, 0.8)
 
 
 def film(trial: Trial, spec: TaskSpec, path: Path, on_progress: Callable[[float], None] | None = None) -> EpisodeResult:
@@ -40,7 +42,10 @@ def film(trial: Trial, spec: TaskSpec, path: Path, on_progress: Callable[[float]
     try:
         size = (WIDTH, HEIGHT + PLOT_HEIGHT)
         writer = imageio_ffmpeg.write_frames(str(unfinished), size, fps=FRAMES_PER_S, macro_block_size=1)
-        writer.send(None)  # starts the generator
+        with warnings.catch_warnings():
+            # JAX warns of any fork; this one at once becomes ffmpeg
+            warnings.filterwarnings("ignore", message=r"os\.fork\(\) was called")
+            writer.send(None)  # starts ffmpeg
         for done, frame in _frames(trial.robot, poses, episode):
             writer.send(frame)
             if on_progress is not None:
@@ -62,9 +67,18 @@ def _frames(spec: RobotSpec, poses: list[Float[np.ndarray, " nq"]], episode: Epi
             decision = step // spec.steps_per_decision
             if step % spec.steps_per_decision == 0 or plot is None:
                 plot = _plot(episode, decision + 1)
-            yield (step + 1) / len(poses), np.concatenate([camera.picture(poses[step]), plot])
+            picture = camera.picture(poses[step], _poles(episode, decision))
+            yield (step + 1) / len(poses), np.concatenate([picture, plot])
     finally:
         camera.close()
+
+
+def _poles(episode: EpisodeResult, decision: int) -> list[Pole]:
+    """Where the hidden goal is, and where it is believed to be after the last finished decision."""
+    if episode.active_family[decision] != "goal":
+        return []
+    poles = [Pole(episode.active_target[decision], TRUTH_POLE)]
+    return [*poles, Pole(episode.inferred_target[decision - 1], BELIEF_POLE)] if decision else poles
 
 
 def _plot(episode: EpisodeResult, until: int) -> UInt8[np.ndarray, "height width 3"]:

@@ -24,16 +24,19 @@ class MetaConfig:
     """Fields of the global state that the policy sees."""
     policy_scales: tuple[float, ...]
     """What each of them is divided by [m, m/s]."""
+    arrival: float = 0.0
+    """Added to the scaled reward r / reward_scale of the policy's learning when r = 0, half of it at r = -0.1. It
+    is a function of the reward alone, and pulls the last centimetres."""
     randomisation: Randomisation = field(default_factory=Randomisation)
     """Disturbances of half of the episodes."""
     observation_noise: float = 0.0
     """Variance of the noise on every observed field (thesis, captions of 6.20)."""
     start: tuple[float, float] = (12.0, 3.0)
     """Episodes start at uniformly random x [m] and vx [m/s] within these."""
-    episodes: int = 64
+    episodes: int = 48
     """Toys that move in parallel: the first half nominal, the other disturbed."""
-    decisions: int = 100
-    """Length of an episode."""
+    decisions: int = 200
+    """Length of an episode: 20 s, as long as it will be used, so that nothing that comes late is new."""
     groups: int = 8
     """Iterations whose episodes are kept for learning."""
     wander_iterations: int = 12

@@ -25,6 +25,7 @@ def position() -> MetaConfig:
             decay_updates=65_000,
             huber=0.05,
         ),
+        arrival=0.05,
         policy_fields=("x", "vx"),
         policy_scales=(10.0, 3.5),
     )

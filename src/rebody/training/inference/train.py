@@ -199,13 +199,17 @@ def sample_transitions(replay: Episodes, stored, config: MetaConfig, key: PRNGKe
     return SACBatch(
         observation=observation(time),
         action=replay.action[group, episode, time],
-        reward=replay.reward[group, episode, time] / config.inference.reward_scale,
+        reward=_shaped(replay.reward[group, episode, time], config),
         next_observation=observation(time + 1),
         terminal=jnp.zeros(size),
     )
 
 
+def _shaped(reward: Float[Array, " batch"], config: MetaConfig) -> Float[Array, " batch"]:
+    return reward / config.inference.reward_scale + config.arrival * 0.1 / (0.1 - reward)
+
+
 def _optimiser(config: MetaConfig) -> optax.GradientTransformation:
-    updates = config.inference_iterations * config.inference_updates
+    updates = max(1, config.inference_iterations * config.inference_updates)
     schedule = optax.cosine_decay_schedule(config.inference.learning_rate, updates, alpha=0.05)
     return optax.chain(optax.clip_by_global_norm(1.0), optax.adam(schedule))

@@ -1,0 +1,132 @@
+"""The encoder's sliding window is exact, and it sees its fields and the reward alone."""
+
+import equinox as eqx
+import jax
+import numpy as np
+import pytest
+
+from rebody.inference import Encoder
+from rebody.inference.encoder import VARIANCE_RANGE
+from rebody.types import DECISION_DT, GLOBAL_FIELDS, GlobalState, Transition
+
+WINDOW, TIME = 5, 13
+SEEN = ("x", "vx")
+
+
+@pytest.fixture(scope="module")
+def encoder():
+    make = eqx.filter_jit(Encoder)
+    return make(
+        fields=SEEN, scales=(10.0, 3.0), reward_scale=10.0, window=WINDOW, latent=2, units=8, key=jax.random.key(0)
+    )
+
+
+@pytest.fixture(scope="module")
+def walk():
+    """Transitions [episode, time] of two episodes in which every field wanders."""
+    rng = np.random.default_rng(0)
+    states = {name: rng.normal(size=(2, TIME + 1)).cumsum(axis=1).astype(np.float32) for name in GLOBAL_FIELDS}
+    return transitions_of(states, -np.abs(states["x"][:, 1:] - 3))
+
+
+def transitions_of(states, reward):
+    return Transition(
+        GlobalState(**{name: values[:, :-1] for name, values in states.items()}),
+        reward,
+        GlobalState(**{name: values[:, 1:] for name, values in states.items()}),
+    )
+
+
+along = eqx.filter_jit(lambda encoder, transitions: encoder.along(transitions))
+
+
+@eqx.filter_jit
+def stepped(encoder, walk):
+    """Beliefs [episode, time], one decision after the other."""
+
+    def step(carry, transition):
+        return encoder.step(carry, transition)
+
+    time_first = jax.tree.map(lambda leaf: leaf.swapaxes(0, 1), walk)
+    _, beliefs = jax.lax.scan(step, encoder.initial((2,)), time_first)
+    return jax.tree.map(lambda leaf: leaf.swapaxes(0, 1), beliefs)
+
+
+@pytest.fixture(scope="module")
+def beliefs(encoder, walk):
+    return stepped(encoder, walk)
+
+
+def assert_same(belief, other):
+    np.testing.assert_allclose(belief.mean, other.mean, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(belief.variance, other.variance, rtol=1e-4, atol=1e-5)
+
+
+def at(tree, *index):
+    return jax.tree.map(lambda leaf: leaf[:, slice(*index)], tree)
+
+
+def test_the_first_window_is_that_of_the_training(encoder, walk, beliefs):
+    assert_same(at(beliefs, WINDOW), along(encoder, at(walk, WINDOW)))
+
+
+@pytest.mark.parametrize("end", range(WINDOW, TIME + 1))
+def test_later_beliefs_rest_on_the_last_window_alone(encoder, walk, beliefs, end):
+    last = along(encoder, at(walk, end - WINDOW, end))
+    assert_same(at(beliefs, end - 1, end), at(last, WINDOW - 1, WINDOW))
+
+
+def test_what_is_older_than_the_window_is_forgotten(encoder, walk, beliefs):
+    moved = eqx.tree_at(lambda w: w.reward, walk, np.where(np.arange(TIME) < 4, -7.0, walk.reward).astype(np.float32))
+    again = stepped(encoder, moved)
+    assert_same(at(again, 3 + WINDOW, None), at(beliefs, 3 + WINDOW, None))
+    assert np.abs(again.mean - beliefs.mean)[:, : 3 + WINDOW].max(axis=(0, 2)).min() > 1e-4
+
+
+def test_fields_that_are_not_among_its_own_do_not_reach_it(encoder, walk, beliefs):
+    """A robot's pitch and height move where the toy's never did."""
+    hidden = [name for name in GLOBAL_FIELDS if name not in SEEN]
+    assert len(hidden) == 6
+    moved = eqx.tree_at(
+        lambda w: [getattr(state, name) for state in (w.previous, w.state) for name in hidden],
+        walk,
+        replace_fn=lambda leaf: leaf + 100,
+    )
+    np.testing.assert_array_equal(stepped(encoder, moved).mean, beliefs.mean)
+    np.testing.assert_array_equal(stepped(encoder, moved).variance, beliefs.variance)
+
+
+@pytest.mark.parametrize(
+    "seen", [lambda w: w.reward, lambda w: w.state.x, lambda w: w.state.vx, lambda w: w.previous.x]
+)
+def test_reward_and_its_own_fields_do(encoder, walk, beliefs, seen):
+    moved = eqx.tree_at(seen, walk, replace_fn=lambda leaf: leaf + 0.5)
+    assert np.abs(stepped(encoder, moved).mean - beliefs.mean).max() > 1e-3
+
+
+def test_features_by_hand(encoder):
+    one = np.ones(1, np.float32)
+    previous, state = (GlobalState(**dict.fromkeys(GLOBAL_FIELDS, one) | {"x": x}) for x in (2 * one, 3 * one))
+    # x / 10, vx / 3, their changes per second, r / 10, compressed r / 10
+    expected = [0.3, 1 / 3, 0.1 / DECISION_DT, 0.0, -0.4, 0.3 * np.arcsinh(-20)]
+    np.testing.assert_allclose(encoder.features(Transition(previous, -4 * one, state)), [expected], rtol=1e-5)
+
+
+def test_before_the_first_transition_it_believes_a_unit_gaussian(encoder):
+    belief = encoder.prior((3,))
+    np.testing.assert_array_equal(belief.mean, np.zeros((3, 2)))
+    np.testing.assert_array_equal(belief.variance, np.ones((3, 2)))
+    np.testing.assert_array_equal(belief.features()[0], [0, 0, 1, 1])
+
+
+def test_variance_stays_in_its_range(encoder, walk):
+    wild = eqx.tree_at(lambda w: w.reward, walk, walk.reward * 1e4)
+    low, high = VARIANCE_RANGE
+    variance = along(encoder, at(wild, WINDOW)).variance
+    assert (variance >= 0.999 * low).all()
+    assert (variance <= 1.001 * high).all()
+
+
+def test_episodes_of_a_batch_do_not_mix(encoder, walk, beliefs):
+    swapped = stepped(encoder, jax.tree.map(lambda leaf: leaf[::-1], walk))
+    assert_same(swapped, jax.tree.map(lambda leaf: leaf[::-1], beliefs))
