@@ -15,8 +15,8 @@ from rebody.inference.module import Evidence, loss
 from rebody.inference.prior import unit_gaussian
 from rebody.types import Belief, GlobalState, Transition
 
-CONFIG = InferenceConfig(window=6, units=16, batch_size=16, decoded=4)
-UPDATES = 100
+CONFIG = InferenceConfig(window=6, units=32, batch_size=16, decoded=4)
+UPDATES = 200
 
 
 def states(x):
@@ -56,7 +56,7 @@ def measured(evidence):
 @pytest.fixture(scope="module")
 def trained(untrained, evidence):
     """The module after some updates on the same evidence."""
-    optimiser = optax.adam(1e-2)
+    optimiser = optax.adam(5e-3)
     arrays, static = eqx.partition(untrained, eqx.is_array)
 
     def update(carry, key):

@@ -1,6 +1,5 @@
 """A video of one episode: the robot above, what it believes below."""
 
-import io
 import os
 import warnings
 from collections.abc import Callable
@@ -11,7 +10,6 @@ import imageio_ffmpeg
 import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float, UInt8
-from PIL import Image
 
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.camera import Camera, Pole
@@ -82,9 +80,9 @@ def _poles(episode: EpisodeResult, decision: int) -> list[Pole]:
 
 
 def _plot(episode: EpisodeResult, until: int) -> UInt8[np.ndarray, "height width 3"]:
-    drawing, axes = plt.subplots(figsize=(WIDTH / 100, PLOT_HEIGHT / 100), layout="constrained")
+    drawing, axes = plt.subplots(figsize=(WIDTH / 100, PLOT_HEIGHT / 100), dpi=100, layout="constrained")
     draw_progress(axes, episode, until)
-    buffer = io.BytesIO()
-    drawing.savefig(buffer, dpi=100)
+    drawing.canvas.draw()
+    pixels = np.array(drawing.canvas.buffer_rgba())[..., :3]  # pyright: ignore[reportAttributeAccessIssue] (Agg)
     plt.close(drawing)
-    return np.asarray(Image.open(buffer).convert("RGB"))
+    return pixels
