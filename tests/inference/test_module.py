@@ -104,7 +104,6 @@ def test_the_prior_enters_the_loss_by_its_weight(untrained, evidence):
 def test_training_lowers_loss_and_errors(untrained, trained, measured, evidence):
     before, errors_before = measured(untrained, evidence)
     after, errors_after = measured(trained, evidence)
-    print(before,after,errors_before,errors_after)
     assert after < before - 0.1
     assert errors_after["reward_error"] < 0.5 * errors_before["reward_error"]
     assert errors_after["state_error"] < 0.5 * errors_before["state_error"]

@@ -92,6 +92,8 @@ def _check(trial: Trial, specs: list[TaskSpec]) -> None:
         raise RebodyError(f"--seconds {trial.seconds:g} is too short: final errors need the last 2 s of at least 3.")
     known = trial.inference.contract.target_ranges
     for spec in specs:
+        if spec.switch is not None and round(spec.switch.at_s / DECISION_DT) >= trial.decisions:
+            raise RebodyError(f"a switch at {spec.switch.at_s:g} s is not within an episode of {trial.seconds:g} s.")
         for family in {spec.family, spec.last.family}:
             if family not in known and trial.agent == "reuse":
                 raise RebodyError(

@@ -52,7 +52,7 @@ def draw_progress(axes: Axes, episode: EpisodeResult, until: int | None = None) 
 
 
 def _trajectories(axes: Axes, results: Results) -> None:
-    largest = max(abs(e.active_target[-1]) for e in results.episodes)
+    largest = max(abs(e.active_target[-1]) for e in results.episodes) or 1.0
     for episode in results.episodes:
         colour = plt.get_cmap(TASKS)(0.5 + 0.5 * episode.active_target[-1] / largest)
         reached = episode.position_m if episode.active_family[-1] == "goal" else episode.velocity_m_s

@@ -1,7 +1,6 @@
 """Task files: a JSON list of tasks, each with an optional change in mid-episode."""
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from rebody.tasks.families import family_index
 from rebody.types import Task
 
 EXAMPLE = '[{"family": "goal", "target": -9.0}]'
+LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def read_tasks(path: Path) -> list[TaskSpec]:
         content = json.loads(path.read_text())
     except FileNotFoundError:
         raise RebodyError(f"there is no task file {path}.") from None
-    except (json.JSONDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
+    except (ValueError, RecursionError, OSError) as error:
         raise RebodyError(f"{path} is not a JSON file ({error}). A task file looks like {EXAMPLE}") from None
     if not isinstance(content, list) or not content:
         raise RebodyError(f"{path} must hold a list of at least one task, such as {EXAMPLE}")
@@ -108,6 +108,6 @@ def _family_and_target(entry: dict[str, Any], where: str) -> tuple[str, float]:
 
 
 def _number(value: Any, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
         raise RebodyError(f"{where}: expected a finite number, got {json.dumps(value)}.")
     return float(value)

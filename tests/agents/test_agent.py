@@ -1,0 +1,162 @@
+"""What each agent says, what it remembers, and that a subgoal is where the policy would lead a toy."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rebody.agents.agent import Observation, relative
+from rebody.agents.parts import build_agent
+from rebody.agents.rollout import begin, decide
+from rebody.errors import RebodyError
+from rebody.inference.probe import fit_probe
+from rebody.tasks import GOAL, VELOCITY
+from rebody.types import Belief, GlobalState, Subgoal, Task
+
+SIZE, DECISIONS = 3, 8
+
+
+def state_of(x, vx):
+    """A robot there [m] at that speed [m/s], its other fields anything."""
+    x, vx = np.asarray(x, np.float32), np.asarray(vx, np.float32)
+    other = np.full_like(x, 0.7)
+    return GlobalState(x, other, other, other, vx, other, other, other)
+
+
+STATE = state_of([1.0, -4.0, 0.0], [2.0, 0.0, -1.0])
+BELIEF = Belief(
+    np.array([[0.5, -1.0], [2.0, 0.3], [0.0, 1.0]], np.float32), np.array([[0.5, 0.1]] * 3, np.float32)
+)
+BELIEF_FEATURES = np.concatenate([BELIEF.mean, np.sqrt(BELIEF.variance)], axis=-1)
+
+say = eqx.filter_jit(lambda agent, state, belief, decision: agent.command(state, belief, decision))
+FIRST = jnp.zeros((), jnp.int32)
+
+
+def by_hand(inference, x, vx, horizon):
+    """x of the mass-damper after following the policy, thesis (6.4-6.6)."""
+    for _ in range(horizon):
+        observation = np.concatenate([np.stack([x / 10.0, vx / 3.5], axis=-1), BELIEF_FEATURES], axis=-1)
+        action = np.asarray(inference.parts.high_level.actor(observation.astype(np.float32)))[:, 0]
+        vx = vx + 0.1 * (7.0 * action - 2.0 * vx) / 1.0
+        x = x + 0.1 * vx
+    return x
+
+
+@pytest.mark.parametrize("horizon", [1, 5])
+def test_a_subgoal_is_where_the_policy_would_lead_a_toy_from_here(inference, horizon):
+    command = say(build_agent("reuse", inference, horizon=horizon), STATE, BELIEF, FIRST)
+    expected = by_hand(inference, np.array(STATE.x), np.array(STATE.vx), horizon)
+    assert np.abs(expected - STATE.x).min() > 0.01  # it goes somewhere
+    np.testing.assert_allclose(command.subgoal.value, expected, atol=1e-5)
+    np.testing.assert_array_equal(command.subgoal.slot, [GOAL] * SIZE)
+
+
+def test_the_action_is_the_policys(inference):
+    command = say(build_agent("reuse", inference), STATE, BELIEF, FIRST)
+    np.testing.assert_allclose(command.action, inference.parts.high_level(STATE, BELIEF), rtol=1e-5)
+    assert command.action.shape == (SIZE, 1)
+
+
+def test_the_subgoal_comes_from_policy_and_dynamics_and_not_from_the_probe(inference):
+    """Trap 1: the bridge is not a readout."""
+    latent = np.random.default_rng(0).normal(size=(50, 2))
+    probe = fit_probe(latent, np.full(50, GOAL), 9.0 + latent[:, 0])
+    probed = replace(inference, parts=eqx.tree_at(lambda p: p.probe, inference.parts, probe))
+    subgoal = say(build_agent("reuse", probed), STATE, BELIEF, FIRST).subgoal
+    np.testing.assert_array_equal(subgoal.value, say(build_agent("reuse", inference), STATE, BELIEF, FIRST).subgoal.value)
+    assert np.abs(subgoal.value - probe(BELIEF)[1]).min() > 1.0
+
+    elsewhere = say(build_agent("reuse", probed), state_of(STATE.x + 3, STATE.vx), BELIEF, FIRST).subgoal
+    assert np.abs(elsewhere.value - subgoal.value).min() > 1.0  # the same belief
+    other_policy = eqx.tree_at(lambda a: a.high_level.actor.net.mlp.biases[-1], build_agent("reuse", probed), np.ones(2))
+    assert np.abs(say(other_policy, STATE, BELIEF, FIRST).subgoal.value - subgoal.value).min() > 0.01
+    other_toy = replace(probed, toy=replace(probed.toy, max_force=1.0))
+    assert np.abs(say(build_agent("reuse", other_toy), STATE, BELIEF, FIRST).subgoal.value - subgoal.value).min() > 0.01
+
+
+def test_one_decision_ahead_lies_within_the_toys_reach(inference):
+    value = say(build_agent("reuse", inference, horizon=1), state_of(STATE.x, 0 * STATE.x), BELIEF, FIRST).subgoal.value
+    assert np.abs(value - STATE.x).max() <= 0.07 + 1e-6  # 0.1 s * 0.1 s * 7 N / 1 kg
+
+
+def test_a_goal_is_a_point_in_the_world_and_a_speed_is_not():
+    """Trap 2: the distance to a goal shrinks as the robot moves."""
+    subgoal = Subgoal(np.array([GOAL, VELOCITY]), np.array([4.0, 1.5]))
+    seen = [np.asarray(relative(subgoal, np.full(2, x))) for x in (0.0, 3.0, 4.0, 5.5)]
+    np.testing.assert_allclose(seen, [[4.0, 1.5], [1.0, 1.5], [0.0, 1.5], [-1.5, 1.5]], atol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def heard():
+    """Observations [decision, episode] of a walk; the first is the start."""
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(DECISIONS + 1, SIZE)).cumsum(axis=0)
+    return Observation(state_of(x, np.diff(x, axis=0, prepend=0) / 0.1), (-np.abs(x - 3)).astype(np.float32))
+
+
+def listen(agent, heard):
+    """Beliefs and commands, one per decision; the first before anything is known."""
+    moments = [jax.tree.map(lambda leaf, i=i: leaf[i], heard) for i in range(DECISIONS + 1)]
+    carry, command = begin(agent, moments[0].state)
+    beliefs, commands = [carry.belief], [command]
+    for moment in moments[1:]:
+        carry, command = decide(agent, carry, moment)
+        beliefs.append(carry.belief)
+        commands.append(command)
+    return jax.tree.map(lambda *steps: np.stack(steps), *zip(beliefs, commands, strict=True))
+
+
+@pytest.mark.parametrize("stride", [3, 4])
+def test_a_stride_holds_the_subgoal_while_the_encoder_ticks_on(inference, heard, stride):
+    beliefs, commands = listen(build_agent("reuse", inference, stride=1), heard)
+    same_beliefs, held = listen(build_agent("reuse", inference, stride=stride), heard)
+    np.testing.assert_allclose(same_beliefs.mean, beliefs.mean, atol=1e-5)
+    np.testing.assert_allclose(same_beliefs.variance, beliefs.variance, rtol=1e-4)
+    spoken = stride * (np.arange(DECISIONS + 1) // stride)
+    np.testing.assert_allclose(held.subgoal.value, commands.subgoal.value[spoken], atol=1e-5)
+    np.testing.assert_allclose(held.action, commands.action[spoken], atol=1e-5)
+    assert np.abs(np.diff(commands.subgoal.value, axis=0)).min() > 1e-3  # otherwise it speaks anew every time
+
+
+def test_it_begins_with_the_prior_and_then_believes_what_the_encoder_does(inference, heard):
+    beliefs, commands = listen(build_agent("reuse", inference), heard)
+    np.testing.assert_array_equal(beliefs.mean[0], np.zeros((SIZE, 2)))
+    np.testing.assert_array_equal(beliefs.variance[0], np.ones((SIZE, 2)))
+    begins = jax.tree.map(lambda leaf: leaf[0], heard.state)
+    unknown = Belief(np.zeros((SIZE, 2), np.float32), np.ones((SIZE, 2), np.float32))
+    imagined = say(build_agent("reuse", inference), begins, unknown, FIRST)
+    np.testing.assert_allclose(commands.subgoal.value[0], imagined.subgoal.value, atol=1e-5)
+    assert np.abs(np.diff(beliefs.mean, axis=0)).max(axis=(1, 2)).min() > 1e-4
+
+
+def test_the_oracle_says_the_active_target(inference, heard):
+    family = np.repeat([[GOAL, VELOCITY, GOAL]], DECISIONS, axis=0)
+    target = np.repeat([[4.0, -1.5, 0.0]], DECISIONS, axis=0).astype(np.float32)
+    family[5:, 0], target[5:, 0] = VELOCITY, 2.0  # another task from the sixth decision on
+    beliefs, commands = listen(build_agent("oracle", inference, Task(family, target)), heard)
+    np.testing.assert_array_equal(commands.subgoal.slot[:DECISIONS], family)
+    np.testing.assert_array_equal(commands.subgoal.value[:DECISIONS], target)
+    reused, _ = listen(build_agent("reuse", inference), heard)
+    np.testing.assert_allclose(beliefs.mean, reused.mean, atol=1e-5)  # it listens
+
+
+def test_the_idle_agent_stands_still(inference, heard):
+    _, commands = listen(build_agent("idle", inference), heard)
+    np.testing.assert_array_equal(commands.subgoal.slot, np.full((DECISIONS + 1, SIZE), VELOCITY))
+    np.testing.assert_array_equal(commands.subgoal.value, np.zeros((DECISIONS + 1, SIZE)))
+
+
+@pytest.mark.parametrize("kind", ["resue", "oracle"])
+def test_an_agent_that_cannot_be_built(inference, kind):
+    with pytest.raises(RebodyError, match=f"unknown agent '{kind}'.*reuse, oracle, idle"):
+        build_agent(kind, inference)  # an oracle without tasks
+
+
+def test_reuse_of_several_families_is_refused(inference):
+    contract = replace(inference.contract, target_ranges={"goal": (-1.0, 1.0), "velocity": (-1.0, 1.0)})
+    with pytest.raises(RebodyError, match="'tiny' tells several families apart"):
+        build_agent("reuse", replace(inference, contract=contract))

@@ -1,0 +1,202 @@
+"""Rollouts: time, frames and what stays frozen; on a toy and on the cheetah."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rebody.agents import rollout
+from rebody.agents.agent import Observation
+from rebody.agents.live import LiveAgent
+from rebody.agents.parts import LoadedTracker, build_agent
+from rebody.agents.rollout import begin, decide, rollout_on_robot, rollout_on_toy, track
+from rebody.bodies import RobotBatch
+from rebody.control.tracker import Command
+from rebody.errors import RebodyError
+from rebody.store import tree_hash
+from rebody.tasks import GOAL, VELOCITY, reward
+from rebody.types import GlobalState, Subgoal, Task, Transition
+
+WINDOW = 6
+SEEDS = np.array([7, 8, 9])
+TARGETS = (3.0, -2.0, 8.0)
+
+
+def lasting(*targets, decisions=WINDOW):
+    target = np.tile(np.array(targets, np.float32), (decisions, 1))
+    return Task(np.full(target.shape, GOAL, np.int32), target)
+
+
+@pytest.fixture(scope="module")
+def agent(inference):
+    return build_agent("reuse", inference, horizon=5)
+
+
+@pytest.fixture(scope="module")
+def run(agent, tracker, cheetah):
+    """A function (targets, seeds, on_frame) -> episodes on the cheetah."""
+
+    def run(targets=TARGETS, seeds=SEEDS, on_frame=None, spec=cheetah):
+        return rollout_on_robot(agent, tracker, spec, lasting(*targets), "plain", seeds, on_frame)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def episodes(run):
+    return run()
+
+
+def assert_same(tree, other, **tolerance):
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, **tolerance), tree, other)
+
+
+def test_shapes_and_length(episodes):
+    for leaf in jax.tree.leaves((episodes.state, episodes.reward, episodes.subgoal)):
+        assert leaf.shape == (WINDOW, 3)
+    assert episodes.belief.mean.shape == episodes.belief.variance.shape == (WINDOW, 3, 2)
+    assert episodes.fell.shape == (3,)
+    assert np.ptp(episodes.state.x, axis=0).min() > 1e-3  # it moves
+
+
+def test_rewards_are_the_tasks(episodes):
+    np.testing.assert_allclose(episodes.reward, -np.abs(episodes.state.x - np.array(TARGETS)), rtol=1e-5)
+
+
+def transitions(state, earned):
+    """[episode, time], from a start at x = 0; the encoder sees x alone."""
+    before = jax.tree.map(lambda leaf: np.concatenate([np.zeros_like(leaf[:1]), leaf[:-1]]), state)
+    return jax.tree.map(lambda leaf: np.asarray(leaf).T, Transition(before, earned, state))
+
+
+def test_the_belief_of_a_decision_includes_its_transition(agent, episodes):
+    along = jax.jit(agent.encoder.along)(transitions(episodes.state, episodes.reward))
+    np.testing.assert_allclose(episodes.belief.mean.swapaxes(0, 1), along.mean, atol=1e-5)
+
+
+def test_the_subgoal_of_a_decision_is_the_one_held_during_it(agent, cheetah, tracker):
+    heard = []
+    episodes = rollout_on_robot(
+        agent, tracker, cheetah, lasting(1.0), "plain", SEEDS[:1], lambda batch, subgoal: heard.append(subgoal.value)
+    )
+    assert len(heard) == WINDOW * cheetah.steps_per_decision
+    np.testing.assert_array_equal(np.array(heard)[:, 0], np.repeat(episodes.subgoal.value[:, 0], 2))
+    assert len(np.unique(heard)) == WINDOW
+
+
+def test_a_goal_is_made_relative_anew_at_every_control_step(run, monkeypatch):
+    """Trap 2: a constant relative goal would be chased for ever."""
+    x_before, told = [0.0], []
+
+    def spy(tracker, joints, subgoal, x):
+        told.append((float(x[0]), float(subgoal.value[0])))
+        return track(tracker, joints, subgoal, x)
+
+    monkeypatch.setattr(rollout, "track", spy)
+    run(on_frame=lambda batch, subgoal: x_before.append(batch.qpos[0, 0]))
+    x, subgoal = np.array(told).T
+    np.testing.assert_allclose(x, x_before[:-1], atol=1e-6)
+    np.testing.assert_array_equal(subgoal[::2], subgoal[1::2])  # two control steps a decision
+    assert np.abs(np.diff(x)).min() > 0
+
+
+def test_the_tracker_is_told_the_distance(tracker):
+    joints = np.linspace(-1, 1, 34, dtype=np.float32).reshape(2, 17)
+    subgoal = Subgoal(np.array([GOAL, VELOCITY]), np.array([4.0, 2.0], np.float32))
+    expected = tracker(joints, Command(subgoal.slot, np.array([1.0, 2.0], np.float32)))
+    np.testing.assert_allclose(track(tracker, joints, subgoal, np.full(2, 3.0, np.float32)), expected, atol=1e-6)
+
+
+def test_nothing_that_is_frozen_changes(inference, tracker, run):
+    before = tree_hash(inference.parts), tree_hash(tracker)
+    run()
+    assert (tree_hash(inference.parts), tree_hash(tracker)) == before
+
+
+def test_same_seeds_same_result(run, episodes):
+    assert_same(run(), episodes, rtol=0, atol=0)
+    other = run(seeds=SEEDS + 10)
+    assert np.abs(other.state.pitch - episodes.state.pitch).min() > 0
+
+
+@pytest.mark.parametrize("i", range(3))
+def test_an_episode_does_not_depend_on_those_beside_it(run, episodes, i):
+    alone = run(TARGETS[i : i + 1], SEEDS[i : i + 1])
+    of_batch = jax.tree.map(lambda leaf: leaf[..., i : i + 1], (episodes.state, episodes.reward, episodes.subgoal))
+    assert_same((alone.state, alone.reward, alone.subgoal), of_batch, atol=1e-4)
+    np.testing.assert_allclose(alone.belief.mean, episodes.belief.mean[:, i : i + 1], atol=1e-5)
+
+
+def test_a_fallen_robot_keeps_scoring(run, cheetah):
+    spec = replace(cheetah, has_fallen=lambda height, pitch: height > -1e9, fall_duration=0.1)
+    episodes = run(spec=spec)
+    assert episodes.fell.all()
+    assert episodes.reward.shape == (WINDOW, 3)
+    assert (episodes.reward < -1).all()
+
+
+def test_a_robot_that_gets_up_again_fell(run, cheetah):
+    looks = iter([False, True, True] + [False] * 20)
+    spec = replace(cheetah, has_fallen=lambda height, pitch: np.full(height.shape, next(looks)), fall_duration=0.1)
+    assert run(spec=spec).fell.all()
+
+
+def test_toy_episodes_are_those_stepped_by_hand(agent, inference):
+    tasks = lasting(*TARGETS)
+    episodes = rollout_on_toy(agent, inference.toy, tasks, "relative")
+    step = eqx.filter_jit(lambda toy, body, action: toy.step(body, action, jax.random.key(0)))
+    body = inference.toy.initial(jnp.zeros(3), jnp.zeros(3))
+    carry, command = begin(agent, inference.toy.observe(body))
+    for i in range(WINDOW):
+        body = step(inference.toy, body, command.action)
+        state = inference.toy.observe(body)
+        earned = reward(jax.tree.map(lambda leaf, i=i: leaf[i], tasks), state, "relative")
+        held = command.subgoal
+        carry, command = decide(agent, carry, Observation(state, earned))
+        now = jax.tree.map(lambda leaf, i=i: leaf[i], (episodes.state, episodes.reward, episodes.belief, episodes.subgoal))
+        assert_same(now, (state, earned, carry.belief, held), atol=1e-5, rtol=1e-5)
+    assert not episodes.fell.any()
+    assert np.abs(episodes.state.x[-1]).min() > 0.01  # it moves
+
+
+@pytest.fixture(scope="module")
+def live(inference, tracker, cheetah):
+    return LiveAgent(cheetah, inference, LoadedTracker("tiny", "cheetah", tracker), horizon=5)
+
+
+def test_an_agent_driven_from_outside_does_the_same(live, cheetah, episodes):
+    """Rewards are those of each control step; those between decisions are not heard."""
+    batch = RobotBatch(cheetah, 1)
+    batch.reset(np.random.default_rng(SEEDS[0]), np.array([True]))
+    live.reset()
+    for i in range(WINDOW):
+        for step in range(cheetah.steps_per_decision):
+            heard = -abs(batch.x[0] - TARGETS[0]) if step == 0 else 99.0
+            batch.step(live.step(np.concatenate([batch.qpos[0], batch.qvel[0]]), float(heard))[None])
+        assert batch.x[0] == pytest.approx(episodes.state.x[i, 0], abs=1e-4)
+        assert float(live.subgoal.value) == pytest.approx(float(episodes.subgoal.value[i, 0]), abs=1e-4)
+    np.testing.assert_allclose(live.belief.mean, episodes.belief.mean[-2, 0], atol=1e-5)
+
+
+def test_an_observation_of_another_body_is_refused(live):
+    with pytest.raises(RebodyError, match=r"'cheetah' observes 18 numbers.*got shape \(17,\)"):
+        live.step(np.zeros(17), 0.0)
+
+
+def test_pitch_and_height_do_not_reach_the_belief(agent):
+    """Trap 4: what is constant on the toy and moves on a robot."""
+    x = np.linspace(0, 1, WINDOW + 1, dtype=np.float32)[:, None]
+    still = np.zeros_like(x)
+
+    def belief(other):
+        state = GlobalState(x, still, other, other, still, still, other, other)
+        carry, _ = begin(agent, jax.tree.map(lambda leaf: leaf[0], state))
+        for i in range(1, WINDOW + 1):
+            now = jax.tree.map(lambda leaf, i=i: leaf[i], state)
+            carry, _ = decide(agent, carry, Observation(now, -np.abs(now.x - 3)))
+        return carry.belief
+
+    assert_same(belief(still), belief(np.sin(20 * x)), rtol=0, atol=0)
