@@ -37,7 +37,7 @@ def test_a_loaded_module_is_the_saved_one(inference, saved):
 
 def test_a_module_of_other_sizes_is_refused(saved):
     with pytest.raises(RebodyError, match="does not fit what is built here"):
-        load_inference(saved(inference={"units": 9}))
+        load_inference(saved(high_level={"hidden": [9]}))
 
 
 def test_a_contract_of_another_version_is_refused(saved):

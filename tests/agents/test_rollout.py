@@ -73,7 +73,7 @@ def transitions(state, earned):
 
 
 def test_the_belief_of_a_decision_includes_its_transition(agent, episodes):
-    along = jax.jit(agent.encoder.along)(transitions(episodes.state, episodes.reward))
+    along = eqx.filter_jit(agent.encoder.along)(transitions(episodes.state, episodes.reward))
     np.testing.assert_allclose(episodes.belief.mean.swapaxes(0, 1), along.mean, atol=1e-5)
 
 

@@ -95,7 +95,7 @@ class RobotSpec:
         vx, vz, pitch_rate = (step[..., i].astype(np.float32) for i in self.root_addresses)
         still = np.zeros_like(x)
         return GlobalState(
-            x=x, y=still, z=z - np.float32(self._rest_z), pitch=wrap_angle(pitch),
+            x=x, y=still, z=np.asarray(z - np.float32(self._rest_z)), pitch=wrap_angle(pitch),
             vx=vx, vy=still, vz=vz, pitch_rate=pitch_rate,
         )  # fmt: skip
 
@@ -130,7 +130,7 @@ class RobotSpec:
 
 def wrap_angle(angle: Floats) -> Floats:
     """An angle in (-pi, pi] [rad]."""
-    return -((np.pi - angle) % (2 * np.pi) - np.pi).astype(angle.dtype)
+    return np.asarray(-((np.pi - angle) % (2 * np.pi) - np.pi), angle.dtype)
 
 
 class RobotBatch:

@@ -13,21 +13,11 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from tensorboardX import SummaryWriter
 
 from rebody.errors import RebodyError
 from rebody.store import load_checkpoint, save_checkpoint
-
-Metrics = dict[str, float]
+from rebody.training.progress import Metrics, progress
 
 
 class RunState(Protocol):
@@ -82,7 +72,7 @@ class Run:
         """Take turns until `iterations` are done; Interrupted after Ctrl-C, RebodyError if a loss diverges."""
         begun, saved = time.monotonic() - self.wall_s, time.monotonic()
         with (
-            self._progress(label, iterations, int(state.iteration)) as show,
+            progress(label, iterations, int(state.iteration)) as show,
             _interrupts() as interrupted,
             SummaryWriter(str(self.out / "events")) as writer,
         ):
@@ -109,41 +99,7 @@ class Run:
 
     def _log(self, writer: SummaryWriter, metrics: Metrics, iteration: int) -> None:
         for name, value in metrics.items():
-            writer.add_scalar(name, value, iteration, walltime=self.wall_s)
-
-    @contextmanager
-    def _progress(self, label: str, total: int, done: int) -> Iterator[Callable[[int, Metrics], None]]:
-        console = Console(stderr=True)
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=30),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(elapsed_when_finished=False),
-            TextColumn("{task.fields[note]}"),
-        )
-        with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-            task = progress.add_task(label, total=total, completed=done, note="")
-            last_line = time.monotonic()
-
-            def show(iteration: int, metrics: Metrics) -> None:
-                nonlocal last_line
-                evaluation = {name: value for name, value in metrics.items() if name.startswith("evaluation/")}
-                note = "  ".join(f"{name.split('/')[1]} {value:.3g}" for name, value in evaluation.items())
-                progress.update(task, completed=iteration)
-                if note:
-                    progress.update(task, note=note)
-                # without a terminal (a log file) a line now and then says the same
-                if not console.is_terminal and (note or time.monotonic() - last_line > 30):
-                    last_line = time.monotonic()
-                    left = self.wall_s / max(iteration, 1) * (total - iteration)
-                    console.print(
-                        f"{label} {iteration}/{total}  {self.wall_s:.0f} s, about {left:.0f} s left  {note}",
-                        highlight=False, soft_wrap=True,
-                    )  # fmt: skip
-
-            yield show
+            writer.add_scalar(name, value, iteration)
 
 
 @contextmanager
