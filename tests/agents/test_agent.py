@@ -27,9 +27,7 @@ def state_of(x, vx):
 
 
 STATE = state_of([1.0, -4.0, 0.0], [2.0, 0.0, -1.0])
-BELIEF = Belief(
-    np.array([[0.5, -1.0], [2.0, 0.3], [0.0, 1.0]], np.float32), np.array([[0.5, 0.1]] * 3, np.float32)
-)
+BELIEF = Belief(np.array([[0.5, -1.0], [2.0, 0.3], [0.0, 1.0]], np.float32), np.array([[0.5, 0.1]] * 3, np.float32))
 BELIEF_FEATURES = np.concatenate([BELIEF.mean, np.sqrt(BELIEF.variance)], axis=-1)
 
 say = eqx.filter_jit(lambda agent, state, belief, decision: agent.command(state, belief, decision))
@@ -67,12 +65,16 @@ def test_the_subgoal_comes_from_policy_and_dynamics_and_not_from_the_probe(infer
     probe = fit_probe(latent, np.full(50, GOAL), 9.0 + latent[:, 0])
     probed = replace(inference, parts=eqx.tree_at(lambda p: p.probe, inference.parts, probe))
     subgoal = say(build_agent("reuse", probed), STATE, BELIEF, FIRST).subgoal
-    np.testing.assert_array_equal(subgoal.value, say(build_agent("reuse", inference), STATE, BELIEF, FIRST).subgoal.value)
+    np.testing.assert_array_equal(
+        subgoal.value, say(build_agent("reuse", inference), STATE, BELIEF, FIRST).subgoal.value
+    )
     assert np.abs(subgoal.value - probe(BELIEF)[1]).min() > 1.0
 
     elsewhere = say(build_agent("reuse", probed), state_of(STATE.x + 3, STATE.vx), BELIEF, FIRST).subgoal
     assert np.abs(elsewhere.value - subgoal.value).min() > 1.0  # the same belief
-    other_policy = eqx.tree_at(lambda a: a.high_level.actor.net.mlp.biases[-1], build_agent("reuse", probed), np.ones(2))
+    other_policy = eqx.tree_at(
+        lambda a: a.high_level.actor.net.mlp.biases[-1], build_agent("reuse", probed), np.ones(2)
+    )
     assert np.abs(say(other_policy, STATE, BELIEF, FIRST).subgoal.value - subgoal.value).min() > 0.01
     other_toy = replace(probed, toy=replace(probed.toy, max_force=1.0))
     assert np.abs(say(build_agent("reuse", other_toy), STATE, BELIEF, FIRST).subgoal.value - subgoal.value).min() > 0.01

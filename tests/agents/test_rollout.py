@@ -156,7 +156,9 @@ def test_toy_episodes_are_those_stepped_by_hand(agent, inference):
         earned = reward(jax.tree.map(lambda leaf, i=i: leaf[i], tasks), state, "relative")
         held = command.subgoal
         carry, command = decide(agent, carry, Observation(state, earned))
-        now = jax.tree.map(lambda leaf, i=i: leaf[i], (episodes.state, episodes.reward, episodes.belief, episodes.subgoal))
+        now = jax.tree.map(
+            lambda leaf, i=i: leaf[i], (episodes.state, episodes.reward, episodes.belief, episodes.subgoal)
+        )
         assert_same(now, (state, earned, carry.belief, held), atol=1e-5, rtol=1e-5)
     assert not episodes.fell.any()
     assert np.abs(episodes.state.x[-1]).min() > 0.01  # it moves

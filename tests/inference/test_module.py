@@ -29,7 +29,9 @@ def evidence():
     """Random walks around 2 m with a hidden goal at -5 or 5 m each: the rewards tell which."""
     rng = np.random.default_rng(0)
     goal = np.where(np.arange(CONFIG.batch_size) % 2, 5.0, -5.0)[:, None].astype(np.float32)
-    x = (2 + 0.5 * rng.normal(size=goal.shape) + 0.2 * rng.normal(size=(len(goal), CONFIG.window + 1)).cumsum(1)).astype("f4")
+    x = (
+        2 + 0.5 * rng.normal(size=goal.shape) + 0.2 * rng.normal(size=(len(goal), CONFIG.window + 1)).cumsum(1)
+    ).astype("f4")
     before = rng.uniform(-6, 6, (len(goal), CONFIG.decoded)).astype(np.float32)
     action = rng.uniform(-1, 1, (*before.shape, 1)).astype(np.float32)
     after = before + 0.1 * action[..., 0]

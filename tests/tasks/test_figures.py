@@ -37,7 +37,9 @@ def test_final_error_of_a_velocity_looks_back_3_s():
 
 def test_an_episode_of_2_s_begins_at_its_start():
     """The first mean velocities are displacements from the start."""
-    assert final_error("velocity", 1.0, 3.0 + TIMES[:20], start=3.0) == pytest.approx(np.mean(1 - np.r_[TIMES[:9], [1] * 11]))
+    assert final_error("velocity", 1.0, 3.0 + TIMES[:20], start=3.0) == pytest.approx(
+        np.mean(1 - np.r_[TIMES[:9], [1] * 11])
+    )
 
 
 def test_final_squared_error_is_that_of_the_last_decision():

@@ -13,7 +13,7 @@ from rebody.tasks import FAMILIES
 
 def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) -> None:
     """Trajectories, latents against targets, and errors of three agents, side by side."""
-    with figure(path, 1, 3, size=(14, 4.2)) as (drawing, (motion, latent, errors)):
+    with figure(path, 1, 3, size=(14.0, 4.2)) as (drawing, (motion, latent, errors)):
         _trajectories(motion, results)
         _latents(latent, results)
         _errors(errors, {"reuse": results, "oracle": oracle, "idle": idle})
@@ -25,7 +25,7 @@ def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) 
 
 def plot_episode(episode: EpisodeResult, path: Path) -> None:
     """One episode: what was reached, what was believed, what was asked of the tracker."""
-    with figure(path, 3, 1, size=(8, 7.5)) as (_, (reached, rewards, latents)):
+    with figure(path, 3, 1, size=(8.0, 7.5)) as (_, (reached, rewards, latents)):
         draw_progress(reached, episode)
         rewards.plot(episode.time_s, episode.reward, color=MOTION)
         rewards.set(ylabel="reward: all that is heard", xlabel="time [s]")

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from tensorboardX import SummaryWriter
@@ -20,6 +20,7 @@ from rebody.store import load_checkpoint, save_checkpoint
 from rebody.training.progress import Metrics, progress
 
 
+@runtime_checkable  # tests check types as they run
 class RunState(Protocol):
     """Everything that a resumed run needs: a pytree that counts its iterations."""
 

@@ -1,0 +1,168 @@
+"""The JSON: its names, that it is strict, and that it is written whole or not at all."""
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from rebody.agents.rollout import Episodes
+from rebody.evaluation import Results, save_results, summary_table
+from rebody.evaluation.results import episode_results
+from rebody.tasks import GOAL, VELOCITY
+from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
+from rebody.types import Belief, GlobalState, Subgoal
+
+HEAD = {
+    "version", "robot", "agent", "inference", "decision_dt", "control_dt", "stride", "horizon", "episodes", "summary",
+}  # fmt: skip
+SERIES = {
+    "time_s", "position_m", "velocity_m_s", "pitch_rad", "vz_max_m_s", "reward", "active_family", "active_target",
+    "inferred_family", "inferred_target", "cluster", "latent", "subgoal_family", "subgoal",
+}  # fmt: skip
+EPISODE = SERIES | {"family", "target", "seed", "fell", "return", "oracle_return", "final_error"}
+BESIDE_HEAD = {"tracker"}
+BESIDE_EPISODE = {"final_squared_error", "ripple_m_s"}
+DECISIONS = 40
+
+
+@pytest.fixture
+def results(result):
+    return Results("cheetah", "reuse", "tiny", "tiny-tracker", 0.05, 1, 15, [result(), result(target=-1.0)])
+
+
+def read(path):
+    """As strict JSON: no NaN, no Infinity."""
+
+    def refuse(constant):
+        raise ValueError(constant)
+
+    return json.loads(path.read_text(), parse_constant=refuse)
+
+
+def test_names_of_the_file(results, tmp_path):
+    save_results(results, tmp_path / "new" / "out.json")
+    content = read(tmp_path / "new" / "out.json")
+    assert content.keys() == HEAD | BESIDE_HEAD
+    assert [episode.keys() for episode in content["episodes"]] == [EPISODE | BESIDE_EPISODE] * 2
+    assert content["version"] == 1
+    assert (content["decision_dt"], content["control_dt"]) == (0.1, 0.05)
+    assert content["episodes"][0]["return"] == -3.0
+    assert content["summary"] == json.loads(json.dumps(results.summary))
+    assert os.listdir(tmp_path / "new") == ["out.json"]
+
+
+def test_a_switch_is_told(results, result, tmp_path):
+    switched = result(switch={"at_s": 1.0, "family": "goal", "target": 3.0})
+    save_results(replace(results, episodes=[switched]), tmp_path / "out.json")
+    assert read(tmp_path / "out.json")["episodes"][0]["switch"] == switched.switch
+
+
+def test_what_json_cannot_hold_leaves_the_old_file(results, result, tmp_path):
+    path = tmp_path / "out.json"
+    path.write_text("old")
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        save_results(replace(results, episodes=[result(final_error=float("nan"))]), path)
+    assert path.read_text() == "old"
+
+
+def test_a_full_disk_leaves_the_old_file(results, tmp_path, monkeypatch):
+    path = tmp_path / "out.json"
+    path.write_text("old")
+    write = Path.write_text
+
+    def write_half(self, text, **options):
+        write(self, text[: len(text) // 2], **options)
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(Path, "write_text", write_half)
+    with pytest.raises(OSError, match="no space"):
+        save_results(results, path)
+    assert path.read_text() == "old"
+    monkeypatch.undo()
+    save_results(results, path)
+    assert read(path)["robot"] == "cheetah"
+
+
+def test_the_table_shows_each_family_that_occurs(results):
+    console = Console(width=200, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
+    console.print(summary_table([results, replace(results, agent="oracle")]))
+    text = console.export_text()
+    console.file.close()
+    assert "cheetah, reuse" in text
+    assert "goal: median error [m]" in text
+    assert "100.0 %" in text  # within tolerance
+    assert "velocity" not in text
+
+
+@pytest.fixture(scope="module")
+def episodes():
+    """Two episodes [time, episode]: one that stands at its goal, one that runs at 1.5 m/s."""
+    time = 0.1 * np.arange(1, DECISIONS + 1, dtype=np.float32)[:, None]
+    x = np.concatenate([np.full_like(time, 4.0), 1.5 * time], axis=-1)
+    still = np.zeros_like(x)
+    vx = np.broadcast_to(np.array([0.0, 1.5], np.float32), x.shape)
+    vz = np.where(time == time[3], 2.0, np.where(time == time[20], -1.0, 0.0)).astype(np.float32) + still
+    state = GlobalState(x, still, still, still + 0.3, vx, still, vz, still)
+    belief = Belief(np.stack([x, -x], axis=-1), np.ones((*x.shape, 2), np.float32))
+    return Episodes(state, -np.abs(x - 5), belief, Subgoal(np.full(x.shape, GOAL), x + 1), np.array([False, True]))
+
+
+@pytest.fixture(scope="module")
+def judged(episodes):
+    specs = [TaskSpec("goal", 5.0), TaskSpec("goal", 3.0, Switch(1.0, "velocity", 2.0))]
+    tasks = active_tasks(specs, DECISIONS, 0.1)
+    family = np.full(episodes.reward.shape, GOAL, np.int32)
+    family[-1] = VELOCITY
+    read = (family, np.full(family.shape, 0.123456789, np.float32))
+    return episode_results(specs, np.array([0, 3]), tasks, episodes, read, np.array([-7.0, -8.0]))
+
+
+def test_one_entry_per_decision(judged):
+    for episode in judged:
+        content = episode.to_json()
+        assert {len(content[name]) for name in SERIES} == {DECISIONS}
+        assert content["time_s"][:3] == [0.1, 0.2, 0.3]
+        assert content["time_s"][-1] == 4.0
+
+
+def test_series_are_those_of_the_episode(judged):
+    stands, runs = judged
+    assert stands.position_m == [4.0] * DECISIONS
+    assert runs.position_m == pytest.approx(1.5 * np.array(runs.time_s), abs=1e-5)
+    assert runs.velocity_m_s == [1.5] * DECISIONS
+    assert stands.pitch_rad == [0.3] * DECISIONS
+    assert stands.latent[0] == [4.0, -4.0]
+    assert stands.subgoal == [5.0] * DECISIONS
+    assert stands.subgoal_family == ["goal"] * DECISIONS
+    assert stands.inferred_target[0] == 0.12346
+    assert stands.inferred_family[-2:] == ["goal", "velocity"]
+    assert [episode.seed for episode in judged] == [0, 3]
+    assert [episode.fell for episode in judged] == [False, True]
+
+
+def test_largest_vz_is_that_of_the_last_second(judged):
+    vz = np.array(judged[0].vz_max_m_s)
+    np.testing.assert_array_equal(vz[:3], np.zeros(3))
+    np.testing.assert_array_equal(vz[3:13], np.full(10, 2.0))  # 2 m/s at the fourth decision
+    np.testing.assert_array_equal(vz[13:], np.zeros(DECISIONS - 13))  # -1 m/s is never the largest
+
+
+def test_returns_and_errors(judged):
+    stands, runs = judged
+    assert stands.return_ == pytest.approx(-DECISIONS)
+    assert (stands.oracle_return, runs.oracle_return) == (-7.0, -8.0)
+    assert (stands.final_error, stands.final_squared_error) == pytest.approx((1.0, 1.0))
+
+
+def test_after_a_switch_the_error_is_taken_against_the_last_task(judged):
+    runs = judged[1]
+    assert (runs.family, runs.target) == ("goal", 3.0)
+    assert runs.active_family == ["goal"] * 10 + ["velocity"] * 30
+    assert runs.active_target == [3.0] * 10 + [2.0] * 30
+    assert runs.final_error == pytest.approx(0.5, abs=1e-5)
+    assert runs.final_squared_error == pytest.approx(0.25, abs=1e-5)
+    assert runs.switch == {"at_s": 1.0, "family": "velocity", "target": 2.0}

@@ -1,0 +1,80 @@
+"""Statistics by hand, with intervals that hold their value and do not change from run to run."""
+
+import numpy as np
+import pytest
+
+from rebody.evaluation.summary import percentile_95, regret, summarise, with_interval
+
+VALUES = np.random.default_rng(0).gamma(1.0, size=40)
+
+
+@pytest.mark.parametrize("statistic", [np.mean, np.median, percentile_95])
+def test_an_interval_holds_its_value_and_is_the_same_again(statistic):
+    found = with_interval(VALUES, statistic)
+    assert found["value"] == statistic(VALUES)
+    assert found["low"] <= found["value"] <= found["high"]
+    assert found["low"] < found["high"]
+    assert with_interval(VALUES, statistic) == found
+
+
+def test_the_interval_of_a_mean_is_that_of_the_normal_distribution():
+    found = with_interval(VALUES, np.mean)
+    half = 1.96 * VALUES.std() / np.sqrt(len(VALUES))
+    assert found["low"] == pytest.approx(VALUES.mean() - half, abs=0.25 * half)
+    assert found["high"] == pytest.approx(VALUES.mean() + half, abs=0.25 * half)
+
+
+@pytest.mark.parametrize("values", [[0.7], [2.0, 2.0, 2.0], [True, True]])
+def test_an_interval_of_nothing_that_varies_is_a_point(values):
+    assert with_interval(values, np.mean) == {"value": values[0], "low": values[0], "high": values[0]}
+
+
+def test_regret_is_of_sums_and_relative_to_the_oracle():
+    assert regret(np.array([[-3.0, -2.0], [-6.0, -4.0]])) == pytest.approx(0.5)
+    assert regret(np.array([[-1.0, -2.0], [-5.0, -4.0]])) == pytest.approx(0.0)
+    assert regret(np.array([[-1.0, -2.0]])) == pytest.approx(-0.5)  # better than the oracle
+    assert regret(np.array([[1.0, 2.0]])) == pytest.approx(0.5)
+
+
+def test_statistics_of_a_family_by_hand(result):
+    errors = [0.1, 0.2, 0.25, 0.3, 4.0]
+    episodes = [
+        result(final_error=error, final_squared_error=error**2, ripple_m_s=10 * error, fell=error > 1)
+        for error in errors
+    ]
+    summary = summarise(episodes)
+    goal = {name: figure["value"] for name, figure in summary["families"]["goal"].items() if name != "episodes"}
+    assert goal == pytest.approx(
+        {
+            "median_error": 0.25,
+            "p95_error": np.percentile(errors, 95),
+            "within_tolerance": 0.6,  # 0.25 m counts
+            "final_mse": np.mean(np.square(errors)),
+            "ripple": 2.5,
+            "base_task_right": 1.0,
+        }
+    )
+    assert summary["episodes"] == summary["families"]["goal"]["episodes"] == 5
+    assert summary["fell"]["value"] == pytest.approx(0.2)
+    assert summary["regret"]["value"] == pytest.approx(0.5)
+
+
+def test_episodes_count_for_the_family_they_end_with(result):
+    switched = result(family="velocity", active_family=["velocity"] * 10 + ["goal"] * 20)
+    other = result(family="velocity", active_family=["velocity"] * 30)
+    families = summarise([result(), switched, other])["families"]
+    assert {name: of["episodes"] for name, of in families.items()} == {"goal": 2, "velocity": 1}
+
+
+@pytest.mark.parametrize(
+    ("inferred", "right"),
+    [(("goal", 2.0), 1), (("goal", 0.1), 1), (("goal", -2.0), 0), (("velocity", 2.0), 0)],
+)
+def test_a_base_task_is_right_when_family_and_sign_are(result, inferred, right):
+    family, target = inferred
+    episode = result(inferred_family=["goal"] * 29 + [family], inferred_target=[9.0] * 29 + [target])
+    assert summarise([episode])["families"]["goal"]["base_task_right"]["value"] == right
+
+
+def test_without_an_oracle_there_is_no_regret(result):
+    assert summarise([result(), result(oracle_return=None)])["regret"] is None

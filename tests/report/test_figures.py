@@ -1,0 +1,81 @@
+"""Figures are written whole, for one episode as for many."""
+
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from PIL import Image
+
+from rebody.evaluation.results import EpisodeResult, Results
+from rebody.report import plot_episode, plot_transfer
+from rebody.report.style import figure
+
+TIME = 30
+
+
+def episode_of(target, family="goal", error=0.1):
+    time = 0.1 * np.arange(1, TIME + 1)
+    x = target * (1 - np.exp(-time))
+    return EpisodeResult(
+        family=family, target=target, seed=0, switch=None, time_s=time.tolist(), position_m=x.tolist(),
+        velocity_m_s=np.gradient(x, time).tolist(), pitch_rad=[0.0] * TIME, vz_max_m_s=[0.0] * TIME,
+        reward=(-np.abs(x - target)).tolist(), active_family=[family] * TIME, active_target=[target] * TIME,
+        inferred_family=[family] * TIME, inferred_target=x.tolist(), cluster=[0] * TIME,
+        latent=np.stack([x, -x], axis=-1).tolist(), subgoal_family=[family] * TIME, subgoal=x.tolist(), fell=False,
+        return_=-3.0, oracle_return=-2.0, final_error=error, final_squared_error=error**2, ripple_m_s=0.0,
+    )  # fmt: skip
+
+
+def results_of(*episodes):
+    return Results("cheetah", "reuse", "tiny", "tiny-tracker", 0.05, 1, 15, list(episodes))
+
+
+def assert_drawn(path):
+    with Image.open(path) as picture:
+        assert picture.format == "PNG"
+        pixels = np.asarray(picture.convert("L"))
+    assert min(pixels.shape) > 300
+    assert (pixels < 128).mean() > 0.001  # there is something on it
+    assert not plt.get_fignums()  # nothing stays open
+
+
+@pytest.mark.parametrize(
+    "episodes",
+    [
+        [episode_of(target) for target in (-9.0, -1.0, 4.0)],
+        [episode_of(4.0)],
+        [episode_of(0.0, error=0.0)],
+        [episode_of(1.5, "velocity"), episode_of(-1.0, "velocity")],
+    ],
+    ids=["many", "one", "a target of zero", "velocity"],
+)
+def test_transfer(episodes, tmp_path):
+    results = results_of(*episodes)
+    plot_transfer(results, results, results, tmp_path / "new" / "transfer.png")
+    assert_drawn(tmp_path / "new" / "transfer.png")
+
+
+@pytest.mark.parametrize("family", ["goal", "velocity"])
+def test_episode(family, tmp_path):
+    plot_episode(episode_of(2.0, family), tmp_path / "episode.png")
+    assert_drawn(tmp_path / "episode.png")
+
+
+def test_episode_with_a_switch(tmp_path):
+    half = TIME // 2
+    switched = replace(
+        episode_of(2.0),
+        switch={"at_s": 1.5, "family": "velocity", "target": -1.0},
+        active_family=["goal"] * half + ["velocity"] * half,
+        active_target=[2.0] * half + [-1.0] * half,
+    )
+    plot_episode(switched, tmp_path / "episode.png")
+    assert_drawn(tmp_path / "episode.png")
+
+
+def test_a_figure_that_fails_leaves_neither_file_nor_memory(tmp_path):
+    with pytest.raises(ValueError, match="shape"), figure(tmp_path / "a.png", 1, 1, size=(4.0, 3.0)) as (_, (axes,)):
+        axes.plot([0, 1], [0, 1, 2])
+    assert not list(tmp_path.iterdir())
+    assert not plt.get_fignums()

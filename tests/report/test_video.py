@@ -1,0 +1,90 @@
+"""A film lasts as long as its episode and shows the robot."""
+
+import equinox as eqx
+import imageio_ffmpeg
+import jax
+import numpy as np
+import pytest
+
+from rebody.agents.parts import Inference, LoadedTracker, inference_template
+from rebody.bodies import load_robot
+from rebody.bodies.camera import Camera
+from rebody.bodies.toys import MassDamper
+from rebody.control.sac import Actor, SACConfig
+from rebody.control.tracker import Tracker
+from rebody.errors import RebodyError
+from rebody.evaluation.evaluate import Trial, evaluate
+from rebody.inference.contract import Contract
+from rebody.report import film, video
+from rebody.report.video import FRAMES_PER_S, PLOT_HEIGHT, WIDTH
+from rebody.tasks.task_file import TaskSpec
+
+SECONDS = 3.0
+
+
+@pytest.fixture(scope="module")
+def trial():
+    contract = Contract(("x",), 6, {"goal": (-10.0, 10.0)}, "plain")
+    config = {
+        "contract": contract.to_config(),
+        "inference": {"units": 8, "window": 6, "latent": 2},
+        "high_level": {"fields": ["x", "vx"], "scales": [10.0, 3.5], "hidden": [8], "projections": 0},
+    }
+    parts = eqx.filter_jit(lambda: inference_template(config))()
+    tracker = Tracker(eqx.filter_jit(Actor)(17 + 6, 6, SACConfig(hidden=(8,)), jax.random.key(1)), 5.0, 3.0)
+    loaded = LoadedTracker("tiny-tracker", "cheetah", tracker)
+    inference = Inference("tiny", contract, parts, MassDamper())
+    return Trial("reuse", inference, load_robot("cheetah"), loaded, seconds=SECONDS, horizon=5)
+
+
+@pytest.fixture(scope="module")
+def opengl(trial):
+    try:
+        Camera(trial.robot.model, width=64, height=48).close()
+    except RebodyError as error:
+        pytest.skip(f"no OpenGL: {error}")
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """A small picture, and below it white: what is drawn there is the figures' business."""
+    for name, size in (("WIDTH", 160), ("HEIGHT", 80), ("PLOT_HEIGHT", 64)):
+        monkeypatch.setattr(video, name, size)
+    white = np.full((64, 160, 3), 255, np.uint8)
+    monkeypatch.setattr(video, "_plot", lambda episode, until: white)
+
+
+@pytest.mark.usefixtures("opengl", "small")
+def test_a_film_lasts_as_long_as_its_episode(trial, tmp_path):
+    heard = []
+    path = tmp_path / "new" / "film.mp4"
+    episode = film(trial, TaskSpec("goal", 2.0), path, heard.append)
+    assert episode.target == 2.0
+    assert len(episode.time_s) == 30
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(path)
+    assert frames == SECONDS * FRAMES_PER_S
+    assert seconds == pytest.approx(SECONDS, abs=0.1)
+    assert heard[-1] == 1.0
+    assert heard == sorted(heard)
+    assert list(path.parent.iterdir()) == [path]
+
+
+@pytest.mark.usefixtures("opengl", "small")
+def test_a_film_that_fails_leaves_the_old_one(trial, tmp_path):
+    path = tmp_path / "film.mp4"
+    path.write_bytes(b"old")
+
+    def fail(done):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        film(trial, TaskSpec("goal", 2.0), path, fail)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_plot_below_fits_and_shows_how_far_it_is(trial):
+    episode = evaluate(trial, [TaskSpec("goal", 2.0)], 1).episodes[0]
+    early, late = (video._plot(episode, until) for until in (2, 30))
+    assert early.shape == late.shape == (PLOT_HEIGHT, WIDTH, 3)
+    assert (early != late).any()
