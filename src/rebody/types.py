@@ -9,7 +9,7 @@ from typing import TypeVar
 import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 DECISION_DT = 0.1
 """Simulated seconds of one decision, on every body."""
@@ -75,6 +75,3 @@ class Subgoal(eqx.Module):
 
     slot: Int[AnyArray, "*batch"]  # index into `rebody.tasks.FAMILIES`
     value: Float[AnyArray, "*batch"]  # m (in the world), m/s or rad
-
-
-Mask = Bool[AnyArray, "*batch"]

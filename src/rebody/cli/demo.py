@@ -7,8 +7,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rebody.cli.evaluate import make_trial
 from rebody.cli.run import describe, shoot
+from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, save_results, summary_table
 from rebody.report import plot_episode, plot_transfer
@@ -33,7 +33,7 @@ class Demo:
             "now drives a robot that it has never seen. Nobody tells it the goal.\n",
             highlight=False,
         )
-        trial = make_trial("cheetah", "reuse", "position", None)
+        trial = TrialOptions(robot="cheetah", inference="position").load()
         specs = [TaskSpec("goal", round(float(goal), 2)) for goal in HIDDEN_GOALS]
         with console.status("60 episodes of 20 s on the cheetah"):
             reuse, oracle, idle = (

@@ -1,16 +1,17 @@
 """`rebody run`: one episode, to look at."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
+import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from rebody.agents.parts import HORIZON
-from rebody.cli.evaluate import make_trial
+from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate
-from rebody.evaluation.evaluate import POINT_MASS, Trial
+from rebody.evaluation.evaluate import Trial
 from rebody.evaluation.results import EpisodeResult
 from rebody.report import film, plot_episode
 from rebody.tasks.task_file import TaskSpec, parse_task
@@ -22,33 +23,18 @@ class RunTask:
 
     task: str
     """FAMILY=TARGET, such as goal=-9."""
-    robot: str = "cheetah"
-    """Body (see `rebody list`)."""
-    inference: str = "position"
-    """Inference artifact: a shipped name or a folder."""
-    agent: str = "reuse"
-    """reuse, oracle (told the task) or idle (knows nothing and stands still)."""
-    tracker: str | None = None
-    """Tracker artifact; default tracker-ROBOT."""
-    seconds: float = 20.0
-    """Length of the episode."""
-    stride: int = 1
-    """Decisions for which a subgoal is held."""
-    horizon: int = HORIZON
-    """Decisions that `reuse` looks ahead; 1 is the thesis."""
     video: Path | None = None
     """Where an MP4 goes."""
     figure: Path | None = None
     """Where a PNG goes."""
+    trial: Annotated[TrialOptions, tyro.conf.arg(name="")] = field(default_factory=TrialOptions)
 
     def run(self) -> None:
         """Run the episode and print its end."""
         spec = parse_task(self.task)
-        if self.video is not None and self.robot == POINT_MASS:
+        trial = self.trial.load()
+        if self.video is not None and trial.robot is None:
             raise RebodyError("there is no video of a point mass; use --figure.")
-        trial = make_trial(
-            self.robot, self.agent, self.inference, self.tracker, self.seconds, self.stride, self.horizon
-        )
         episode = evaluate(trial, [spec], 1).episodes[0] if self.video is None else shoot(trial, spec, self.video)
         if self.figure is not None:
             plot_episode(episode, self.figure)

@@ -2,7 +2,8 @@
 
 import json
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -72,26 +73,21 @@ class Results:
     horizon: int
     episodes: list[EpisodeResult]
 
-    @property
+    @cached_property
     def summary(self) -> dict[str, Any]:
         """Statistics per family, with 95 % bootstrap intervals."""
         return summarise(self.episodes)
 
     def to_json(self) -> dict[str, Any]:
         """The whole file."""
-        head = {name: value for name, value in asdict_shallow(self).items() if name != "episodes"}
+        names = [field.name for field in fields(self) if field.name != "episodes"]
         return {
             "version": VERSION,
-            **head,
+            **{name: getattr(self, name) for name in names},
             "decision_dt": DECISION_DT,
             "episodes": [episode.to_json() for episode in self.episodes],
             "summary": self.summary,
         }
-
-
-def asdict_shallow(results: Results) -> dict[str, Any]:
-    """Fields of a dataclass without descending into them."""
-    return {name: getattr(results, name) for name in results.__dataclass_fields__}
 
 
 def save_results(results: Results, path: Path) -> None:
