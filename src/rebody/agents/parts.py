@@ -1,5 +1,7 @@
 """From artifacts to parts, and from parts to an agent."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +19,8 @@ from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig, InferenceModule
 from rebody.inference.contract import Contract
 from rebody.inference.probe import Probe
-from rebody.store import arrays_into_tree, load_artifact
-from rebody.types import Task
+from rebody.store import Artifact, arrays_into_tree, load_artifact
+from rebody.types import Task, Tree
 
 HORIZON = 15
 """Decisions that `reuse` looks ahead; 1 is the thesis."""
@@ -68,22 +70,45 @@ def inference_template(config: dict[str, Any]) -> InferenceParts:
     )
 
 
+def tracker_template(config: dict[str, Any]) -> Tracker:
+    """A tracker of the right shapes, to be filled with weights."""
+    actor = _actor_template(config["observations"], config["actions"], config)
+    return Tracker(actor, config["max_distance"], config["max_speed"])
+
+
 def load_inference(reference: str) -> Inference:
     """A shipped inference artifact by name, or one in a folder; RebodyError if it cannot be read."""
     artifact = load_artifact(reference, "inference")
-    contract = Contract.from_config(artifact.config["contract"])
-    parts = arrays_into_tree(inference_template(artifact.config), artifact.arrays, f"artifact {artifact.name}")
-    return Inference(artifact.name, contract, parts, MassDamper(**artifact.config["toy"]))
+    with _understood(artifact):
+        contract = Contract.from_config(artifact.config["contract"])
+        parts = _fill(inference_template, artifact)
+        return Inference(artifact.name, contract, parts, MassDamper(**artifact.config["toy"]))
 
 
 def load_tracker(reference: str) -> LoadedTracker:
     """A shipped tracker artifact by name, or one in a folder; RebodyError if it cannot be read."""
     artifact = load_artifact(reference, "tracker")
-    config = artifact.config
-    actor = _actor_template(config["observations"], config["actions"], config)
-    template = Tracker(actor, config["max_distance"], config["max_speed"])
-    tracker = arrays_into_tree(template, artifact.arrays, f"artifact {artifact.name}")
-    return LoadedTracker(artifact.name, config["robot"], tracker)
+    with _understood(artifact):
+        return LoadedTracker(artifact.name, artifact.config["robot"], _fill(tracker_template, artifact))
+
+
+def _fill(template: Callable[[dict[str, Any]], Tree], artifact: Artifact) -> Tree:
+    """The template of an artifact's configuration with its weights; no random weights are drawn for it."""
+    shapes = eqx.filter_eval_shape(lambda: template(artifact.config))
+    zeros = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
+    return arrays_into_tree(zeros, artifact.arrays, f"artifact {artifact.name}")
+
+
+@contextmanager
+def _understood(artifact: Artifact) -> Iterator[None]:
+    """Turns what an unfamiliar config.json brings about into a message."""
+    try:
+        yield
+    except (KeyError, TypeError) as error:
+        raise RebodyError(
+            f"the settings of artifact '{artifact.name}' are not understood ({error}): another release of rebody "
+            "made it. Install that release, or train the artifact again."
+        ) from error
 
 
 def check_fit(inference: Inference, robot: str, moving_fields: tuple[str, ...]) -> None:

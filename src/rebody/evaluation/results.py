@@ -94,8 +94,11 @@ def save_results(results: Results, path: Path) -> None:
     """Write the JSON, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.name}.new")
-    unfinished.write_text(json.dumps(results.to_json(), allow_nan=False))
-    os.replace(unfinished, path)
+    try:
+        unfinished.write_text(json.dumps(results.to_json(), allow_nan=False))
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
 
 
 def episode_results(
