@@ -88,7 +88,7 @@ def _errors(axes: Axes, agents: dict[str, Results]) -> None:
         ylabel="episodes with at most this error [%]",
         title="what inference brings",
     )
-    axes.legend(frameon=False, loc="upper left")
+    axes.legend(frameon=False, loc="upper center")
 
 
 def _unit(family: str) -> str:
