@@ -16,7 +16,7 @@ import numpy as np
 from tensorboardX import SummaryWriter
 
 from rebody.errors import RebodyError
-from rebody.store import load_checkpoint, save_checkpoint
+from rebody.store import load_checkpoint, save_checkpoint, tree_to_arrays
 from rebody.training.progress import Metrics, progress
 
 
@@ -45,6 +45,8 @@ class Run:
         self.checkpoint_every_s = checkpoint_every_s
         self.wall_s = 0.0
         """Seconds of training so far, over all resumptions."""
+        if out.exists() and not out.is_dir():
+            raise RebodyError(f"{out} is a file; a run needs a folder. Choose another --out.")
         if not resume and ((out / "checkpoint").exists() or (out / "manifest.json").exists()):
             raise RebodyError(f"{out} already holds a run. Add --resume to go on with it, or choose another --out.")
 
@@ -96,6 +98,7 @@ class Run:
         return self.out / "checkpoint"
 
     def _save(self, state: RunState) -> None:
+        _check_finite(_worst(state), self.out)  # the last update may have broken what the losses do not show yet
         save_checkpoint(self._checkpoint, state, {"settings": self.settings, "wall_s": self.wall_s})
 
     def _log(self, writer: SummaryWriter, metrics: Metrics, iteration: int) -> None:
@@ -119,10 +122,17 @@ def _interrupts() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
+def _worst(state: RunState) -> Metrics:
+    """Of every array in the state, a number that is finite where all of it is."""
+    arrays = {name: array for name, array in tree_to_arrays(state).items() if array.dtype.kind == "f"}
+    return {name: 0.0 if np.isfinite(array).all() else np.nan for name, array in arrays.items()}
+
+
 def _check_finite(metrics: Metrics, out: Path) -> None:
     bad = [name for name, value in metrics.items() if not np.isfinite(value)]
     if bad:
+        more = f" and {len(bad) - SHOWN}" " more" if len(bad) > SHOWN else ""
         raise RebodyError(
-            f"training diverged: {', '.join(bad)} is not finite. The last checkpoint in {out} is from before; "
+            f"training diverged: {', '.join(bad[:SHOWN])}{more} is not finite. The last checkpoint in {out} is from before; "
             "try a smaller learning rate."
         )

@@ -80,7 +80,7 @@ def save_inference(
     rows = {}
     for name, value in figures.items():
         unit = units.get(name.split()[0])
-        rows[f"{name}, {HELD_OUT} held-out tasks, 20 s on the toy"] = f"{value:.4g}" + (f" {unit}" if unit else "")
+        rows[f"{name}, {HELD_OUT} held-out tasks, 20 s on the toy"] = f"{value:.5g}" + (f" {unit}" if unit else "")
     steps = config.iterations * config.episodes * config.decisions
     what = (
         f"Inference module (encoder, decoder, probe) and the toy's high-level policy, trained on a point mass "
