@@ -18,12 +18,12 @@ from rebody.training.tracker import report as tracker_report
 from rebody.training.tracker import train as tracker_train
 
 TRACKER = """
-    train tracker --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 4 --replay 60
+    train tracker --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60
     --sac.hidden 8 8 --sac.batch-size 8
 """
 INFERENCE = """
     train inference --episodes 8 --decisions 24 --groups 2
-    --wander-iterations 1 --joint-iterations 2 --policy-iterations 1 --inference-updates 2 --policy-updates 2
+    --wander-iterations 1 --joint-iterations 2 --policy-iterations 6 --inference-updates 2 --policy-updates 2
     --inference.units 8 --inference.window 4 --inference.batch-size 4 --inference.decoded 2
     --sac.hidden 8 8 --sac.projections 2 --sac.batch-size 8
 """
@@ -36,9 +36,7 @@ class Pipeline:
     name: str
     """Kind of the artifact that it makes."""
     arguments: list[str]
-    """Command line of a tiny run of four turns, without --out."""
-    more_turns: list[str]
-    """What makes it sixteen turns."""
+    """Command line of a tiny run, without --out."""
     train: ModuleType
     """Where its `iterate` is."""
 
@@ -61,8 +59,8 @@ def checkpoint(out: Path) -> dict:
 
 
 PIPELINES = {
-    "tracker": Pipeline("tracker", TRACKER.split(), ["--iterations", "16"], tracker_train),
-    "inference": Pipeline("inference", INFERENCE.split(), ["--policy-iterations", "13"], inference_train),
+    "tracker": Pipeline("tracker", TRACKER.split(), tracker_train),
+    "inference": Pipeline("inference", INFERENCE.split(), inference_train),
 }
 
 

@@ -1,7 +1,7 @@
 """A training run that is killed again and again: python killed.py MOMENTS ARGUMENTS-OF-REBODY...
 
-MOMENTS such as `2.31,3.07`: the first life ends 0.31 turns after its second turn, the next life resumes and
-ends 0.07 turns after its third. A turn ends with a checkpoint. Prints how each life ended.
+MOMENTS such as `0.31,1.07`: the first life ends in its first turn, the next one resumes and ends early in its
+second. A turn includes the checkpoint at its end. Prints how each life ended.
 Each life is a fork, made before JAX starts any thread: what is imported is imported once.
 """
 
@@ -18,6 +18,9 @@ from rebody.training.run import Run
 from rebody.training.tracker import train as tracker
 
 
+FIRST_TURN_S = 1.0  # it compiles
+
+
 class DoomedRun(Run):
     def __init__(self, moment, *arguments, **options):
         super().__init__(*arguments, **options, checkpoint_every_s=-1.0)
@@ -28,12 +31,19 @@ class DoomedRun(Run):
 
         def iterate_and_die(state):
             begun.append(time.monotonic())
-            if len(begun) == self.last_turn + 1:
-                delay = self.share * (begun[-1] - begun[-2])
-                threading.Timer(delay, os.kill, (os.getpid(), signal.SIGKILL)).start()
+            turn = len(begun) - 1
+            if turn == self.last_turn:
+                expected = begun[-1] - begun[-2] if turn > 1 else FIRST_TURN_S
+                threading.Timer(self.share * expected, die).start()
+            if turn > self.last_turn:
+                die()  # the turn was shorter than expected
             return iterate(state)
 
         return super().loop(state, iterate_and_die, iterations, label)
+
+
+def die():
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def live(moment, arguments):

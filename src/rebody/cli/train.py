@@ -92,6 +92,6 @@ def _wanted_preset(arguments: list[str]) -> str:
 
 
 def _show_card(folder: Path) -> None:
-    console = Console()
+    console = Console(soft_wrap=True)  # whole lines, so that it stays Markdown
     console.print((folder / "card.md").read_text(), markup=False, highlight=False)
     console.print(f"artifact: {folder}", markup=False, highlight=False)

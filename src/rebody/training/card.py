@@ -17,7 +17,7 @@ from rebody.training.run import Run
 def card(title: str, what: str, run: Run, seed: int, figures: Mapping[str, str]) -> str:
     """Markdown: what it is, the exact command and seed that made it, wall time, machine, figures."""
     # a resumed run ends as the uninterrupted one would have
-    command = shlex.join(["rebody", *(argument for argument in sys.argv[1:] if argument != "--resume")])
+    command = shlex.join([Path(sys.argv[0]).name, *(argument for argument in sys.argv[1:] if argument != "--resume")])
     machine = f"{os.cpu_count()} x {_processor()}, {platform.system()}, Python {platform.python_version()}"
     versions = f"rebody {__version__}, JAX {jax.__version__}, MuJoCo {mujoco.__version__}"
     rows = "\n".join(f"| {name} | {value} |" for name, value in figures.items())

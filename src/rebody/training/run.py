@@ -19,6 +19,8 @@ from rebody.errors import RebodyError
 from rebody.store import load_checkpoint, save_checkpoint, tree_to_arrays
 from rebody.training.progress import Metrics, progress
 
+SHOWN_FAULTS = 5
+
 
 @runtime_checkable  # tests check types as they run
 class RunState(Protocol):
@@ -98,7 +100,7 @@ class Run:
         return self.out / "checkpoint"
 
     def _save(self, state: RunState) -> None:
-        _check_finite(_worst(state), self.out)  # the last update may have broken what the losses do not show yet
+        _check_finite(_faults(state), self.out)  # the last update may have broken what no loss shows yet
         save_checkpoint(self._checkpoint, state, {"settings": self.settings, "wall_s": self.wall_s})
 
     def _log(self, writer: SummaryWriter, metrics: Metrics, iteration: int) -> None:
@@ -122,17 +124,16 @@ def _interrupts() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _worst(state: RunState) -> Metrics:
-    """Of every array in the state, a number that is finite where all of it is."""
-    arrays = {name: array for name, array in tree_to_arrays(state).items() if array.dtype.kind == "f"}
-    return {name: 0.0 if np.isfinite(array).all() else np.nan for name, array in arrays.items()}
+def _faults(state: RunState) -> Metrics:
+    """NaN under the name of every array of the state that is not finite."""
+    return {name: np.nan for name, array in tree_to_arrays(state).items() if not np.isfinite(array).all()}
 
 
 def _check_finite(metrics: Metrics, out: Path) -> None:
     bad = [name for name, value in metrics.items() if not np.isfinite(value)]
     if bad:
-        more = f" and {len(bad) - SHOWN}" " more" if len(bad) > SHOWN else ""
+        more = f" and {len(bad) - SHOWN_FAULTS} more" if len(bad) > SHOWN_FAULTS else ""
         raise RebodyError(
-            f"training diverged: {', '.join(bad[:SHOWN])}{more} is not finite. The last checkpoint in {out} is from before; "
-            "try a smaller learning rate."
+            f"training diverged: not finite: {', '.join(bad[:SHOWN_FAULTS])}{more}. "
+            f"Any checkpoint in {out} is from before; try a smaller learning rate."
         )
