@@ -17,7 +17,6 @@ from rebody.training.inference import train as inference
 from rebody.training.run import Run
 from rebody.training.tracker import train as tracker
 
-
 FIRST_TURN_S = 1.0  # it compiles
 
 

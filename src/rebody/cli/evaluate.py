@@ -7,6 +7,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
+from rebody.cli.output import check_output
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results, summary_table
@@ -29,6 +30,7 @@ class Evaluate:
         """Evaluate, save, print the table."""
         if self.seeds < 1:
             raise RebodyError("--seeds must be at least 1.")
+        check_output(self.json, "--json")
         specs = read_tasks(self.tasks)
         trial = self.trial.load()
         console = Console()

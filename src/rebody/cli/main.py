@@ -27,8 +27,9 @@ def run(arguments: list[str]) -> int:
         command = parse(arguments)
         command.run()
     except RebodyError as error:
-        Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {_plain(error)}", highlight=False)
-        return 2
+        return _complain(error)
+    except OSError as error:  # no permission, a full disk
+        return _complain(f"{error.filename}: {error.strerror}" if error.filename else error)
     except Interrupted as interruption:
         Console(stderr=True, soft_wrap=True).print(_plain(interruption), highlight=False)
         return 130
@@ -54,6 +55,11 @@ def parse(arguments: list[str]) -> Any:
         | Annotated[List, tyro.conf.subcommand("list")]
     )
     return tyro.cli(commands, prog="rebody", args=arguments, description=DESCRIPTION)
+
+
+def _complain(message: object) -> int:
+    Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {_plain(message)}", highlight=False)
+    return 2
 
 
 def _plain(message: object) -> str:

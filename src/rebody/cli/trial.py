@@ -1,5 +1,6 @@
 """Options that all commands share which put an agent to the test."""
 
+import math
 from dataclasses import dataclass
 
 from rebody.agents.parts import HORIZON, load_inference, load_tracker
@@ -32,6 +33,8 @@ class TrialOptions:
         for name in ("stride", "horizon"):
             if getattr(self, name) < 1:
                 raise RebodyError(f"--{name} must be at least 1.")
+        if not math.isfinite(self.seconds):
+            raise RebodyError(f"--seconds must be finite, not {self.seconds:g}.")
         on_toy = self.robot == POINT_MASS
         return Trial(
             agent=self.agent,

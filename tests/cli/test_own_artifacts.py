@@ -1,0 +1,198 @@
+"""What a user trained is used as what is shipped, and files are written whole or not at all."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from rebody.cli.main import run
+from rebody.store import load_artifact, save_artifact
+
+SECONDS, DECISIONS = "3", 30
+TASKS = [
+    {"family": "goal", "target": 2.0},
+    {"family": "goal", "target": -1.0, "switch": {"at_s": 1.5, "family": "goal", "target": 4.0}},
+]
+PER_DECISION = {
+    "time_s": float, "position_m": float, "velocity_m_s": float, "pitch_rad": float, "vz_max_m_s": float,
+    "reward": float, "active_family": str, "active_target": float, "inferred_family": str, "inferred_target": float,
+    "cluster": int, "latent": list, "subgoal_family": str, "subgoal": float,
+}  # fmt: skip
+PER_EPISODE = {"family", "target", "seed", "fell", "return", "oracle_return", "final_error"}
+HEAD = {"version", "robot", "agent", "inference", "decision_dt", "control_dt", "stride", "horizon", "summary"}
+
+
+@pytest.fixture
+def tasks(tmp_path):
+    path = tmp_path / "tasks.json"
+    path.write_text(json.dumps(TASKS))
+    return path
+
+
+@pytest.fixture
+def evaluate(trained, tasks, tmp_path):
+    """A function: options -> (exit code, what the JSON holds) of an evaluation of the tiny artifacts."""
+
+    def evaluate(*options):
+        out = tmp_path / "out.json"
+        parts = ["--inference", str(trained["inference"]), "--seconds", SECONDS, "--seeds", "2"]
+        code = run(["evaluate", "--tasks", str(tasks), *parts, "--json", str(out), *options])
+        return code, json.loads(out.read_text()) if out.exists() else None
+
+    return evaluate
+
+
+@pytest.mark.parametrize("robot", ["point-mass", "cheetah"])
+def test_the_json_is_as_documented(robot, trained, evaluate, capsys):
+    tracker = [] if robot == "point-mass" else ["--tracker", str(trained["tracker"])]
+    code, results = evaluate("--robot", robot, *tracker, "--stride", "2", "--horizon", "3")
+    assert code == 0
+    assert robot in capsys.readouterr().out
+    assert results.keys() >= HEAD
+    assert (results["version"], results["robot"], results["agent"]) == (1, robot, "reuse")
+    assert (results["inference"], results["stride"], results["horizon"]) == ("inference", 2, 3)
+    assert (results["decision_dt"], results["control_dt"]) == (0.1, 0.1 if robot == "point-mass" else 0.05)
+    assert [(e["family"], e["target"], e["seed"]) for e in results["episodes"]] == [
+        ("goal", 2.0, 0), ("goal", 2.0, 1), ("goal", -1.0, 0), ("goal", -1.0, 1),
+    ]  # fmt: skip
+    for episode in results["episodes"]:
+        assert episode.keys() >= PER_EPISODE
+        for name, kind in PER_DECISION.items():
+            assert len(episode[name]) == DECISIONS, name
+            assert all(isinstance(value, kind) for value in episode[name]), name
+        np.testing.assert_allclose(episode["time_s"], 0.1 * np.arange(1, DECISIONS + 1), atol=1e-6)
+        missed = np.abs(np.subtract(episode["position_m"], episode["active_target"]))
+        np.testing.assert_allclose(episode["reward"], -missed, atol=1e-4)
+        assert episode["return"] == pytest.approx(sum(episode["reward"]), abs=1e-2)
+        missed_at_last = np.abs(np.subtract(episode["position_m"][-20:], episode["active_target"][-1]))
+        assert episode["final_error"] == pytest.approx(missed_at_last.mean(), abs=1e-3)
+        assert (np.diff(episode["subgoal"])[::2] == 0).all()  # held for two decisions
+        assert (episode["oracle_return"] is None) == (robot == "point-mass")
+    switched = results["episodes"][2]
+    assert switched["switch"] == TASKS[1]["switch"]
+    assert switched["active_target"] == 15 * [-1.0] + 15 * [4.0]
+    assert results["summary"]["families"]["goal"]["episodes"] == 4
+
+
+def test_oracle_and_idle_do_not_listen_to_the_module(trained, evaluate):
+    tracker = ["--robot", "cheetah", "--tracker", str(trained["tracker"])]
+    _, oracle = evaluate(*tracker, "--agent", "oracle")
+    _, idle = evaluate(*tracker, "--agent", "idle")
+    for told, still in zip(oracle["episodes"], idle["episodes"], strict=True):
+        assert told["subgoal"] == told["active_target"]
+        assert told["return"] == pytest.approx(told["oracle_return"])
+        assert set(still["subgoal_family"]) == {"velocity"}
+        assert set(still["subgoal"]) == {0.0}
+        assert still["oracle_return"] == pytest.approx(told["return"])
+
+
+def test_the_same_command_writes_the_same_results(trained, evaluate):
+    tracker = ["--robot", "cheetah", "--tracker", str(trained["tracker"])]
+    assert evaluate(*tracker) == evaluate(*tracker)
+
+
+def test_run_draws_on_own_artifacts(trained, tmp_path, capsys):
+    parts = ["--inference", str(trained["inference"]), "--tracker", str(trained["tracker"])]
+    figure = tmp_path / "new" / "episode.pdf"
+    assert run(["run", "--task", "goal=-2", *parts, "--seconds", SECONDS, "--figure", str(figure)]) == 0
+    assert "hidden goal -2: read from the belief" in capsys.readouterr().out
+    assert figure.read_bytes().startswith(b"%PDF")
+    assert [path.name for path in figure.parent.iterdir()] == [figure.name]
+
+
+def refused(code, capsys, *said):
+    """Whether a command ended as it should when the user can mend something: one line, no traceback."""
+    complaint = capsys.readouterr().err
+    assert code == 2
+    assert complaint.startswith("error: ")
+    assert complaint.count("\n") == 1
+    for part in said:
+        assert part in complaint
+
+
+@pytest.mark.parametrize("name", ["tracker", "inference"])
+@pytest.mark.parametrize("file", ["weights.safetensors", "config.json", "card.md", "manifest.json"])
+def test_a_flipped_byte_is_noticed_wherever_it_is(name, file, trained, evaluate, tmp_path, capsys):
+    broken = shutil.copytree(trained[name], tmp_path / "broken")
+    data = bytearray((broken / file).read_bytes())
+    data[len(data) // 2] ^= 1
+    (broken / file).write_bytes(data)
+    parts = {"tracker": str(trained["tracker"]), name: str(broken)}
+    code, results = evaluate(*(word for part, folder in parts.items() for word in (f"--{part}", folder)))
+    refused(code, capsys, "damaged", file if file != "manifest.json" else "")
+    assert results is None
+
+
+@pytest.mark.parametrize("name", ["tracker", "inference"])
+def test_a_missing_artifact_or_file_is_named(name, trained, evaluate, tmp_path, capsys):
+    refused(evaluate(f"--{name}", str(tmp_path / "none"))[0], capsys, str(tmp_path / "none"), "Shipped artifacts")
+    broken = shutil.copytree(trained[name], tmp_path / "broken")
+    (broken / "weights.safetensors").unlink()
+    code, _ = evaluate(f"--{name}", str(broken))
+    refused(code, capsys, "weights.safetensors is missing")
+
+
+def test_an_artifact_of_the_other_kind_is_named(trained, evaluate, capsys):
+    refused(evaluate("--tracker", str(trained["inference"]))[0], capsys, "kind 'inference'", "'tracker' is needed")
+    refused(evaluate("--inference", str(trained["tracker"]))[0], capsys, "kind 'tracker'", "'inference' is needed")
+
+
+@pytest.mark.parametrize("seconds", ["nan", "inf", "-5", "2.9"])
+def test_a_length_that_makes_no_sense(seconds, evaluate, capsys):
+    code, results = evaluate("--robot", "point-mass", "--seconds", seconds)
+    refused(code, capsys, "--seconds")
+    assert results is None
+
+
+@pytest.mark.parametrize("option", ["--seeds", "--stride", "--horizon"])
+def test_less_than_one_makes_no_sense(option, evaluate, capsys):
+    refused(evaluate("--robot", "point-mass", option, "0")[0], capsys, f"{option} must be at least 1")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("evaluate --tasks tasks.json --json folder", "folder is a folder"),
+        ("evaluate --tasks tasks.json --json tasks.json/x/out.json", "tasks.json is a file, not a folder"),
+        ("run --task goal=1 --figure episode.xyz", "must end with .png or .pdf or .svg"),
+        ("run --task goal=1 --figure episode", "must end with .png"),
+        ("run --task goal=1 --figure folder.png", "is a folder"),
+        ("run --task goal=1 --video film.foo", "must end with .mp4"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_any_work(words, said, tasks, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder.png").mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    refused(run([*words.split(), "--inference", "never-looked-at"]), capsys, said)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_system_that_refuses_to_write_is_one_message(evaluate, monkeypatch, tmp_path, capsys):
+    def full(*_):
+        raise OSError(28, "No space left on device", str(tmp_path / "out.json"))
+
+    with monkeypatch.context() as patched:
+        patched.setattr("os.replace", full)
+        code, results = evaluate("--robot", "point-mass")
+    refused(code, capsys, "out.json", "No space left on device")
+    assert results is None
+    assert [path.name for path in tmp_path.iterdir()] == ["tasks.json"]
+
+
+def test_unknown_options_are_usage_errors(capsys):
+    for words in ("evaluate", "run --task goal=1 --colour red", "train tracker --out x", "fly"):
+        with pytest.raises(SystemExit) as stopped:
+            run(words.split())
+        assert stopped.value.code == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_tracker_for_another_robot_is_refused(trained, evaluate, tmp_path, capsys):
+    loaded = load_artifact(trained["tracker"], "tracker")
+    other = save_artifact(
+        tmp_path / "other", kind="tracker", config=loaded.config | {"robot": "walker"}, weights=loaded.arrays, card=""
+    )
+    refused(evaluate("--tracker", str(other))[0], capsys, "trained on 'walker', not on 'cheetah'")

@@ -1,0 +1,32 @@
+"""A tiny meta-training."""
+
+import jax
+import pytest
+
+from rebody.bodies.toys import MassDamper
+from rebody.control.sac import SACConfig
+from rebody.inference import InferenceConfig
+from rebody.tasks import BaseTask, TaskDistribution
+from rebody.training.inference import MetaConfig
+from rebody.training.inference.train import initial_state
+
+
+@pytest.fixture(scope="session")
+def config():
+    return MetaConfig(
+        tasks=TaskDistribution((BaseTask("goal", 0.0, 10.0), BaseTask("goal", -10.0, 0.0))),
+        reward="plain",
+        inference=InferenceConfig(window=4, units=8, batch_size=300, decoded=3, reward_scale=10.0),
+        sac=SACConfig(hidden=(8, 8), batch_size=300),
+        policy_fields=("x", "vx"),
+        policy_scales=(10.0, 3.5),
+        episodes=8,
+        decisions=12,
+        groups=3,
+    )
+
+
+@pytest.fixture(scope="session")
+def state(config):
+    """A run that has not begun."""
+    return initial_state(config, MassDamper(), jax.random.key(0))

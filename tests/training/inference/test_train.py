@@ -1,0 +1,143 @@
+"""What the updates of meta-training are given."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rebody.store import tree_hash
+from rebody.training.inference import train
+from rebody.training.inference.episodes import Episodes
+from rebody.training.inference.train import sample_evidence, sample_transitions, store
+from rebody.types import Belief, GlobalState
+
+
+def number(group, episode, time):
+    """Says in one number which entry of the replay it is."""
+    return 10_000 * group + 100 * episode + time
+
+
+@pytest.fixture(scope="module")
+def labelled(config):
+    """A replay whose values say where they stand."""
+    group, episode, time = np.ogrid[: config.groups, : config.episodes, : config.decisions + 1]
+    where = number(group, episode, time).astype(np.float32)
+    state = GlobalState(**{name: where + i / 8 for i, name in enumerate(GlobalState.__dataclass_fields__)})
+    latent = np.repeat(where[..., None], config.inference.latent, axis=-1)
+    return jax.tree.map(
+        jnp.asarray,
+        Episodes(
+            state=state,
+            belief=Belief(latent + 0.5, (latent + 1.0) ** 2),
+            action=where[..., :-1, None],
+            reward=-where[..., :-1],
+        ),
+    )
+
+
+def unpack(numbers):
+    numbers = np.asarray(numbers).astype(int)
+    return numbers // 10_000, numbers // 100 % 100, numbers % 100
+
+
+@pytest.mark.parametrize("stored", [1, 2, 3])
+def test_evidence_is_a_window_and_transitions_of_the_same_episode(labelled, config, stored):
+    evidence = sample_evidence(labelled, stored, config, jax.random.key(0))
+    window = evidence.window
+    size, length = config.inference.batch_size, config.inference.window
+    assert window.reward.shape == (size, length)
+    assert evidence.reward.shape == (size, config.inference.decoded)
+
+    group, episode, time = unpack(window.previous.x)
+    assert set(group.ravel()) == set(range(stored))
+    assert set(episode.ravel()) == set(range(config.episodes))
+    np.testing.assert_array_equal(time, time[:, :1] + np.arange(length))
+    for column in (group, episode):
+        np.testing.assert_array_equal(column, column[:, :1] + np.zeros(length, int))
+    assert set(time[:, 0]) == set(range(config.decisions - length + 1))
+    np.testing.assert_array_equal(window.reward, -window.previous.x)
+    np.testing.assert_array_equal(window.state.x, window.previous.x + 1)
+    np.testing.assert_array_equal(window.state.vx, window.previous.x + 1 + 4 / 8)  # the fifth field
+
+    of_group, of_episode, at = unpack(evidence.previous.x)
+    decoded = np.zeros(config.inference.decoded, int)
+    np.testing.assert_array_equal(of_group, group[:, :1] + decoded)
+    np.testing.assert_array_equal(of_episode, episode[:, :1] + decoded)
+    assert set(at.ravel()) == set(range(config.decisions))
+    np.testing.assert_array_equal(evidence.action[..., 0], evidence.previous.x)
+    np.testing.assert_array_equal(evidence.reward, -evidence.previous.x)
+    np.testing.assert_array_equal(evidence.state.x, evidence.previous.x + 1)
+
+
+def test_many_windows_begin_with_their_episode(labelled, config):
+    many = replace(config, inference=replace(config.inference, batch_size=4000))
+    evidence = sample_evidence(labelled, 3, many, jax.random.key(1))
+    begins = unpack(evidence.window.previous.x[:, 0])[2] == 0
+    by_chance = 1 / (config.decisions - config.inference.window + 1)
+    assert begins.mean() == pytest.approx(0.3 + 0.7 * by_chance, abs=0.03)
+
+
+@pytest.mark.parametrize("stored", [1, 3])
+def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, config, stored):
+    plain = replace(config, arrival=0.0, policy_scales=(1.0, 1.0))
+    batch = sample_transitions(labelled, stored, plain, jax.random.key(0))
+    x, vx, *belief = np.asarray(batch.observation).T
+    group, episode, time = unpack(x)
+    assert set(group) == set(range(stored))
+    assert set(episode) == set(range(config.episodes // 2))
+    assert set(time) == set(range(config.decisions))
+    np.testing.assert_array_equal(vx, x + 4 / 8)
+    for mean in belief[: config.inference.latent]:
+        np.testing.assert_array_equal(mean, x + 0.5)
+    for deviation in belief[config.inference.latent :]:
+        np.testing.assert_allclose(deviation, x + 1.0, rtol=1e-5)
+    np.testing.assert_array_equal(batch.action[:, 0], x)
+    np.testing.assert_allclose(batch.reward, -x / plain.inference.reward_scale, rtol=1e-6)
+    later = np.asarray(batch.next_observation).T
+    np.testing.assert_array_equal(later[:4], [x + 1, vx + 1, *(mean + 1 for mean in belief[:2])])
+    assert not np.asarray(batch.terminal).any()
+
+
+def test_scales_divide_what_the_policy_sees(labelled, config):
+    plain, scaled = (
+        sample_transitions(labelled, 3, replace(config, policy_scales=scales), jax.random.key(0)).observation
+        for scales in ((1.0, 1.0), (10.0, 3.5))
+    )
+    np.testing.assert_allclose(scaled[:, :2] * np.array([10.0, 3.5]), plain[:, :2], rtol=1e-5)
+
+
+def test_arrival_is_paid_on_the_spot_and_half_of_it_at_ten_centimetres(labelled, config):
+    paid = replace(config, arrival=0.4)
+    for earned, extra in ((0.0, 0.4), (-0.1, 0.2), (-10.0, 0.4 * 0.1 / 10.1)):
+        replay = Episodes(labelled.state, labelled.belief, labelled.action, jnp.full_like(labelled.reward, earned))
+        batch = sample_transitions(replay, 3, paid, jax.random.key(0))
+        np.testing.assert_allclose(batch.reward, earned / 10.0 + extra, rtol=1e-5)
+
+
+def test_the_newest_episodes_replace_the_oldest(labelled, config):
+    replay = jax.tree.map(jnp.zeros_like, labelled)
+    for iteration in range(5):
+        new = jax.tree.map(lambda leaf, i=iteration: jnp.full_like(leaf[0], i + 1), labelled)
+        replay, stored = store(replay, new, iteration)
+        assert int(stored) == min(iteration + 1, 3)
+    for leaf in jax.tree.leaves(replay):
+        np.testing.assert_array_equal(leaf.reshape(3, -1).T - np.array([4, 5, 3]), 0)
+
+
+def test_inference_is_frozen_while_the_policy_learns_on(pipelines, tmp_path, monkeypatch):
+    """One turn of wandering: inference alone. Two with both. Then the policy alone."""
+    states, iterate = [], train.iterate
+    monkeypatch.setattr(train, "iterate", lambda state, *rest: states.append(state) or iterate(state, *rest))
+    assert pipelines["inference"](tmp_path / "run") == 0
+
+    def changed(part):
+        return [tree_hash(part(old)) != tree_hash(part(new)) for old, new in pairwise(states[:6])]
+
+    assert [int(state.iteration) for state in states] == list(range(9))
+    assert changed(lambda state: state.module.encoder) == [True, True, True, False, False]
+    assert changed(lambda state: state.module.decoder.reference) == [True, True, True, False, False]
+    assert changed(lambda state: state.sac.actor) == [False, True, True, True, True]
+    assert changed(lambda state: state.replay.reward) == 5 * [True]

@@ -1,0 +1,87 @@
+"""What a tracker is asked to do while it learns."""
+
+import jax
+import numpy as np
+import pytest
+
+from rebody.bodies.toys import MassDamper
+from rebody.tasks import GOAL, VELOCITY
+from rebody.training.tracker.commands import CommandDistribution, ToyGuide, _scripted_action
+from rebody.types import GlobalState, Task
+
+DRAWN = 40_000
+ROUGHLY = 0.01  # four standard deviations of a share
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """(goals [m], speeds [m/s]) of a distribution that is not the default one."""
+    distribution = CommandDistribution(max_distance=4.0, max_speed=2.0, near_share=0.3, zero_share=0.2)
+    command = distribution.sample(jax.random.key(0), (DRAWN,))
+    slot, value = np.asarray(command.slot), np.asarray(command.value)
+    assert set(slot) == {GOAL, VELOCITY}
+    return value[slot == GOAL], value[slot == VELOCITY]
+
+
+def test_half_of_the_commands_are_goals(drawn):
+    goals, _ = drawn
+    assert len(goals) / DRAWN == pytest.approx(0.5, abs=ROUGHLY)
+
+
+@pytest.mark.parametrize(("which", "limit"), [(0, 4.0), (1, 2.0)])
+def test_commands_fill_their_limits_evenly_to_both_sides(drawn, which, limit):
+    values = drawn[which]
+    assert 0.99 * limit < np.abs(values).max() <= limit
+    assert np.mean(values > 0) == pytest.approx(0.4, abs=ROUGHLY)
+    assert np.mean(values == 0) == pytest.approx(0.2, abs=ROUGHLY)
+
+
+def test_near_goals_are_as_likely_at_every_scale(drawn):
+    goals = np.abs(drawn[0])
+    for low in (0.01, 0.1):  # half of the near ones each, and what is near by chance
+        share = np.mean((goals > low) & (goals <= 10 * low))
+        assert share == pytest.approx(0.8 * (0.3 / 2 + 0.7 * 9 * low / 4.0), abs=ROUGHLY)
+
+
+def test_speeds_are_uniform(drawn):
+    speeds = np.sort(drawn[1][drawn[1] != 0])
+    expected = np.linspace(-2.0, 2.0, len(speeds))
+    assert np.abs(speeds - expected).max() < 0.05
+
+
+def robots_at(x, vx):
+    x, vx = np.asarray(x, np.float32), np.asarray(vx, np.float32)
+    still = np.zeros_like(x)
+    return GlobalState(x, still, still, still, vx, still, still, still)
+
+
+def test_a_guide_is_the_toy_stepped_as_often_as_it_is_ahead():
+    family = np.array([GOAL, GOAL, GOAL, VELOCITY, VELOCITY, GOAL], np.int32)
+    target = np.array([8.0, -3.0, 0.5, 2.5, -1.0, 8.0], np.float32)
+    horizon = np.array([1, 4, 9, 1, 6, 9], np.int32)
+    state = robots_at([0.0, 1.0, 0.4, 2.0, -5.0, 0.0], [0.0, 2.0, -0.5, 0.3, 1.0, 0.0])
+    subgoal = ToyGuide(Task(family, target), horizon).subgoal(state, 9)
+    np.testing.assert_array_equal(subgoal.slot, family)
+
+    toy = MassDamper()
+    body, expected = toy.from_global(state), np.full(len(family), np.nan)
+    for ahead in range(1, 10):
+        body = toy.step(body, _scripted_action(toy, body, Task(family, target)), jax.random.key(0))
+        reached = np.where(family == GOAL, body.x, body.vx)
+        expected = np.where(horizon == ahead, reached, expected)
+    np.testing.assert_allclose(subgoal.value, expected, rtol=1e-5, atol=1e-6)
+
+
+def test_a_guide_one_decision_ahead_is_nearby():
+    """As the subgoals of `reuse` at a horizon of 1: from rest, no farther than the toy accelerates in 0.1 s."""
+    subgoal = ToyGuide(Task(np.array([GOAL]), np.array([8.0])), np.array([1])).subgoal(robots_at([0.0], [0.0]), 15)
+    np.testing.assert_allclose(subgoal.value, 0.1 * 0.1 * 7.0, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("family", "target", "within"),  # at a goal it switches between full forces
+    [(GOAL, 8.0, 0.25), (GOAL, -0.3, 0.25), (VELOCITY, 3.0, 1e-3), (VELOCITY, -1.0, 1e-3)],
+)
+def test_the_scripted_toy_arrives(family, target, within):
+    guide = ToyGuide(Task(np.array([family]), np.array([target], np.float32)), np.array([60]))
+    np.testing.assert_allclose(guide.subgoal(robots_at([0.0], [1.0]), 60).value, target, atol=within)

@@ -1,0 +1,109 @@
+"""Orders: points in the world that last for a while."""
+
+import jax
+import numpy as np
+import pytest
+
+from rebody.tasks import GOAL, VELOCITY
+from rebody.training.tracker.commands import ToyGuide
+from rebody.training.tracker.orders import commands, follow_guides, no_orders, renew
+from rebody.types import Task
+
+
+def move_to(batch, x):
+    batch.qpos[:, batch.spec.root_addresses[0]] = x
+
+
+def give(orders, batch, config, seed):
+    renew(orders, batch, config, np.random.default_rng(seed), jax.random.key(seed))
+
+
+def copy(orders):
+    return jax.tree.map(np.copy, orders)
+
+
+@pytest.fixture
+def ordered(batch, config):
+    """(orders, drawn) of robots at x = 100: some that hold goals and speeds, and the commands then."""
+    move_to(batch, 100.0)
+    for seed in range(20):
+        orders = no_orders(config.robots)
+        give(orders, batch, config, seed)
+        if len(set(orders.slot)) == 2:
+            return orders, commands(orders, batch.x)
+    raise AssertionError("no draw with both slots")
+
+
+def test_orders_are_given_at_once_and_within_reach(ordered, config):
+    orders, seen = ordered
+    limits = np.where(seen.slot == GOAL, config.commands.max_distance, config.commands.max_speed)
+    assert (np.abs(seen.value) <= limits).all()
+    assert (orders.steps_left > 0).all()
+
+
+def test_a_goal_stays_where_it_is_in_the_world(ordered, batch):
+    orders, seen = ordered
+    world = np.where(orders.slot == GOAL, 100.0 + seen.value, seen.value)
+    np.testing.assert_allclose(orders.value, world, rtol=1e-6)
+    move_to(batch, np.array([99.0, 101.5, 103.0]))
+    later = commands(orders, batch.x)
+    np.testing.assert_array_equal(later.slot, seen.slot)
+    nearer = np.where(seen.slot == GOAL, np.array([-1.0, 1.5, 3.0]), 0.0)
+    np.testing.assert_allclose(later.value, seen.value - nearer, atol=2e-5)
+
+
+def test_an_order_lasts_until_its_time_is_up(ordered, batch, config):
+    orders, _ = ordered
+    orders.steps_left[:] = (3, 0, 50)
+    before = copy(orders)
+    given = []
+    for step in range(4):
+        give(orders, batch, config, 100 + step)
+        given.append(orders.value != before.value)
+        if step == 0:
+            kept = orders.value[1]
+    np.testing.assert_array_equal(np.array(given).T, [[0, 0, 0, 1], [1, 1, 1, 1], [0, 0, 0, 0]])
+    assert orders.value[1] == kept
+    assert orders.steps_left[2] == 46
+
+
+def test_an_order_lasts_as_long_as_the_settings_say(batch, config):
+    lasting = []
+    for seed in range(200):
+        orders = no_orders(config.robots)
+        give(orders, batch, config, seed)
+        lasting.extend(orders.steps_left * batch.spec.control_dt)
+    shortest, longest = config.segment_s
+    assert min(lasting) == pytest.approx(shortest, abs=0.2)
+    assert max(lasting) == pytest.approx(longest, abs=0.2)
+    assert np.mean(lasting) == pytest.approx((shortest + longest) / 2, abs=0.5)
+
+
+def test_a_quarter_is_guided_to_something_farther(batch, config):
+    guided, ratio = [], []
+    for seed in range(300):
+        orders = no_orders(config.robots)
+        give(orders, batch, config, seed)
+        guided.extend(orders.guided)
+        assert ((orders.guide_horizon >= 1) & (orders.guide_horizon <= config.max_horizon)).all()
+        away = orders.value != 0
+        times = np.where(orders.slot == GOAL, 2.0, 1.0)
+        ratio.extend((orders.guide_target / np.where(away, orders.value, 1.0) / times)[away])
+    assert np.mean(guided) == pytest.approx(0.25, abs=0.06)
+    np.testing.assert_allclose(ratio, 1.0, rtol=1e-5)
+
+
+def test_only_guided_robots_are_told_where_their_toy_will_be(ordered, batch, config):
+    orders, _ = ordered
+    orders.guided[:] = (True, False, True)
+    orders.slot[:] = (GOAL, GOAL, VELOCITY)
+    orders.guide_target[:] = (107.0, 107.0, 2.0)
+    orders.guide_horizon[:] = (5, 5, 2)
+    before = copy(orders)
+    state = batch.spec.observe(batch.qpos, batch.qpos)
+    follow_guides(orders, state, config)
+    toys = ToyGuide(Task(orders.slot, orders.guide_target), orders.guide_horizon).subgoal(state, config.max_horizon)
+    np.testing.assert_allclose(orders.value[[0, 2]], np.asarray(toys.value)[[0, 2]], rtol=1e-6)
+    assert 100.0 < orders.value[0] < 102.0
+    assert orders.value[1] == before.value[1]
+    np.testing.assert_array_equal(orders.steps_left, before.steps_left)
