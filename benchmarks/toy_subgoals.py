@@ -9,6 +9,7 @@ that brings its path closest to the toy's; the error is what is left after that 
 
 import numpy as np
 
+from rebody.agents.controller import TrackerController
 from rebody.agents.parts import load_inference, load_tracker
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, load_robot
@@ -24,21 +25,21 @@ LAGS_S = np.arange(0.0, 1.55, 0.05)
 
 def main() -> None:
     inference, spec = load_inference("position"), load_robot("cheetah")
-    tracker = load_tracker("tracker-cheetah").tracker
+    controller = TrackerController(load_tracker("tracker-cheetah").tracker)
     print("| horizon [decisions] | lag [s] | mean error after that shift [m] | final error [m], median |")
     print("|---|---|---|---|")
     for horizon in HORIZONS:
         trial = Trial("reuse", inference, None, None, horizon=horizon)
         episodes = evaluate(trial, [TaskSpec("goal", float(goal)) for goal in GOALS], 1).episodes
         toy = np.array([episode.position_m for episode in episodes]).T
-        robot = play(np.array([episode.subgoal for episode in episodes]).T, spec, tracker)
+        robot = play(np.array([episode.subgoal for episode in episodes]).T, spec, controller)
         errors = [shifted_error(toy, robot, lag, spec.control_dt) for lag in LAGS_S]
         best = int(np.argmin(errors))
         final = np.median(np.abs(robot[-40:].mean(0) - toy[-1]))
         print(f"| {horizon} | {LAGS_S[best]:.2f} | {errors[best]:.3f} | {final:.3f} |")
 
 
-def play(subgoals: np.ndarray, spec, tracker) -> np.ndarray:
+def play(subgoals: np.ndarray, spec, controller) -> np.ndarray:
     """x [m] of robots after each control step, given goals [decision, robot]."""
     batch = RobotBatch(spec, subgoals.shape[1])
     batch.reset(np.random.default_rng(0))
@@ -46,7 +47,7 @@ def play(subgoals: np.ndarray, spec, tracker) -> np.ndarray:
     for values in subgoals.astype(np.float32):
         subgoal = Subgoal(np.zeros(len(values), np.int32), values)
         for _ in range(spec.steps_per_decision):
-            follow(tracker, batch, subgoal)
+            follow(controller, batch, subgoal)
             positions.append(batch.x)
     return np.array(positions)
 

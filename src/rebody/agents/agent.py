@@ -1,6 +1,8 @@
 """An agent: what it remembers, and one decision."""
 
 from abc import abstractmethod
+from collections.abc import Callable
+from typing import Any, Protocol
 
 import equinox as eqx
 import jax
@@ -8,8 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Float, Int
 
 from rebody.bodies.toys import Toy
-from rebody.control.high_level import HighLevelPolicy
-from rebody.inference import Encoder, EncoderCarry
+from rebody.control.high_level import HighLevelPolicy, TaskCode
 from rebody.tasks import FAMILIES, GOAL, VELOCITY
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task, Transition
 
@@ -28,10 +29,30 @@ class Command(eqx.Module):
     subgoal: Subgoal
 
 
+class Inferrer(Protocol):
+    """What believes: a trained encoder, or the exact posterior in its place."""
+
+    def initial(self, shape: tuple[int, ...]) -> Any:
+        """Its memory before anything is seen."""
+        ...
+
+    def prior(self, shape: tuple[int, ...]) -> Belief:
+        """The belief before anything is seen."""
+        ...
+
+    def step(self, memory: Any, transition: Transition) -> tuple[Any, Belief]:
+        """Take in a transition."""
+        ...
+
+
+Reader = Callable[[Belief], tuple[Int[AnyArray, "*batch"], Float[AnyArray, "*batch"]]]
+"""Says which family and target a belief speaks of."""
+
+
 class Carry(eqx.Module):
     """What an agent remembers from one decision to the next."""
 
-    encoder: EncoderCarry
+    memory: Any  # of its inferrer
     belief: Belief
     previous: GlobalState
     command: Command
@@ -41,26 +62,27 @@ class Carry(eqx.Module):
 class Agent(eqx.Module):
     """Serves toy and robot alike; holds nothing that learns."""
 
-    encoder: Encoder
+    inferrer: Inferrer
+    reader: Reader
     stride: int = eqx.field(static=True)
 
     def begin(self, state: GlobalState) -> tuple[Carry, Command]:
         """The first decision of an episode, when nothing is known."""
         shape = state.x.shape
-        belief = self.encoder.prior(shape)
+        belief = self.inferrer.prior(shape)
         first = jnp.zeros((), jnp.int32)
         command = self.command(state, belief, first)
-        carry = Carry(self.encoder.initial(shape), belief, state, command, first + 1)
+        carry = Carry(self.inferrer.initial(shape), belief, state, command, first + 1)
         return carry, command
 
     def decide(self, carry: Carry, observation: Observation) -> tuple[Carry, Command]:
         """Take in the transition since the last decision; speak anew at every `stride`-th."""
         transition = Transition(carry.previous, observation.reward, observation.state)
-        encoder, belief = self.encoder.step(carry.encoder, transition)
+        memory, belief = self.inferrer.step(carry.memory, transition)
         fresh = self.command(observation.state, belief, carry.decisions)
         speaks = carry.decisions % self.stride == 0
         command = jax.tree.map(lambda new, held: jnp.where(speaks, new, held), fresh, carry.command)
-        return Carry(encoder, belief, observation.state, command, carry.decisions + 1), command
+        return Carry(memory, belief, observation.state, command, carry.decisions + 1), command
 
     @abstractmethod
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
@@ -94,26 +116,53 @@ class ReuseAgent(Agent):
         return self.toy.observe(body)
 
 
-class OracleAgent(Agent):
-    """Told the task: its target is the subgoal. The encoder only listens."""
+class ToldAgent(Agent):
+    """Takes a task for true: its target is the subgoal, and on a toy it acts by a policy that is told it."""
+
+    told_policy: HighLevelPolicy
+    task_code: TaskCode
+
+    def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
+        """The best for that task."""
+        task = self.task(belief, decision)
+        return Command(self.told_policy(state, self.task_code(task)), Subgoal(task.family, task.target))
+
+    @abstractmethod
+    def task(self, belief: Belief, decision: Int[AnyArray, ""]) -> Task:
+        """The task that it takes for true."""
+
+
+class OracleAgent(ToldAgent):
+    """Told the truth. Its inferrer only listens."""
 
     tasks: Task  # the active ones, [time, episode]
 
+    def task(self, belief: Belief, decision: Int[AnyArray, ""]) -> Task:
+        """The one that is active now."""
+        return jax.tree.map(lambda field: jnp.take(field, decision, axis=0, mode="clip"), self.tasks)
+
+
+class ReadoutAgent(ToldAgent):
+    """Takes for true what is read from its belief: `readout` by a linear probe, `bayes` the posterior's mode."""
+
+    def task(self, belief: Belief, decision: Int[AnyArray, ""]) -> Task:
+        """What the belief speaks of."""
+        return Task(*self.reader(belief))
+
+
+class FlatAgent(Agent):
+    """Only believes: a flat policy makes joint actions of that (thesis 6.3.2), so there is no subgoal."""
+
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
-        """The target that is active now."""
-        active = jax.tree.map(lambda field: jnp.take(field, decision, axis=0, mode="clip"), self.tasks)
-        return Command(jnp.zeros((*state.x.shape, 1)), Subgoal(active.family, active.target))
+        """Nothing: the value is not a number."""
+        none = jnp.full(state.x.shape, jnp.nan)
+        return Command(none[..., None], Subgoal(jnp.full(state.x.shape, GOAL), none))
 
 
 class IdleAgent(Agent):
-    """Knows nothing and stands still: what a robot without inference would get."""
+    """Knows nothing and stands still: what a body without inference would get."""
 
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """A speed of zero."""
         still = Subgoal(jnp.full(state.x.shape, VELOCITY), jnp.zeros_like(state.x))
         return Command(jnp.zeros((*state.x.shape, 1)), still)
-
-
-def relative(subgoal: Subgoal, x: Float[AnyArray, "*batch"]) -> Float[AnyArray, "*batch"]:
-    """A subgoal as the robot sees it now: a goal is a point in the world, so its distance shrinks."""
-    return subgoal.value - jnp.where(subgoal.slot == GOAL, x, 0.0)

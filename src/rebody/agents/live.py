@@ -6,8 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 from rebody.agents.agent import Observation
-from rebody.agents.parts import HORIZON, Inference, LoadedTracker, build_agent, check_fit, load_inference, load_tracker
-from rebody.agents.rollout import begin, decide, track
+from rebody.agents.build import HORIZON, build_agent, check_fit
+from rebody.agents.controller import TrackerController
+from rebody.agents.parts import Inference, LoadedTracker, load_inference, load_tracker
+from rebody.agents.rollout import begin, decide, joint_action
 from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
 from rebody.tasks import FAMILIES
@@ -20,7 +22,8 @@ class LiveAgent:
     def __init__(self, spec: RobotSpec, inference: Inference, tracker: LoadedTracker, horizon: int = HORIZON):
         """RebodyError if the module does not fit the robot."""
         check_fit(inference, spec.name, spec.moving_fields)
-        self._spec, self._inference, self._tracker = spec, inference, tracker.tracker
+        self._spec, self._inference = spec, inference
+        self._controller = TrackerController(tracker.tracker)
         self._agent = build_agent("reuse", inference, horizon=horizon)
         self.reset()
 
@@ -45,7 +48,8 @@ class LiveAgent:
             self._decide(qpos, reward)
         self._steps += 1
         x = np.asarray(qpos[self._spec.root_addresses[0]], np.float32)
-        return np.asarray(track(self._tracker, self._spec.joint_state(qpos, qvel), self._command.subgoal, x))
+        joints = self._spec.joint_state(qpos, qvel)
+        return np.asarray(joint_action(self._controller, joints, x, self._command.subgoal, self._carry.belief))
 
     @property
     def belief(self) -> Belief:

@@ -1,6 +1,6 @@
-"""From artifacts to parts, and from parts to an agent."""
+"""From artifacts to parts."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -10,27 +10,26 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rebody.agents.agent import Agent, IdleAgent, OracleAgent, ReuseAgent
-from rebody.bodies.toys import MassDamper, Toy
-from rebody.control.high_level import HighLevelPolicy
+from rebody.bodies.toys import Toy, make_toy
+from rebody.control.flat import FlatPolicy
+from rebody.control.high_level import HighLevelPolicy, TaskCode
 from rebody.control.sac import Actor, SACConfig
-from rebody.control.tracker import SLOTS, Tracker
+from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig, InferenceModule
 from rebody.inference.contract import Contract
 from rebody.inference.probe import Probe
 from rebody.store import Artifact, arrays_into_tree, load_artifact
-from rebody.types import Task, Tree
-
-HORIZON = 15
-"""Decisions that `reuse` looks ahead; 1 is the thesis."""
+from rebody.tasks import family_index
+from rebody.types import Tree
 
 
 class InferenceParts(eqx.Module):
-    """What an inference artifact holds: the frozen module, the toy's policy, and the probe."""
+    """What an inference artifact holds: the frozen module, the toy's policies, and the probe."""
 
     module: InferenceModule
-    high_level: HighLevelPolicy
+    high_level: HighLevelPolicy  # acts by a belief
+    told_policy: HighLevelPolicy  # the same, told the task: the toy's oracle
     probe: Probe
 
 
@@ -43,6 +42,11 @@ class Inference:
     parts: InferenceParts
     toy: Toy
 
+    @property
+    def task_code(self) -> TaskCode:
+        """How a task is put to the policy that is told it."""
+        return task_code(self.contract.target_ranges)
+
 
 @dataclass(frozen=True)
 class LoadedTracker:
@@ -53,20 +57,28 @@ class LoadedTracker:
     tracker: Tracker
 
 
+@dataclass(frozen=True)
+class LoadedFlat:
+    """A loaded flat policy; it understands the beliefs of one module only."""
+
+    name: str
+    robot: str
+    inference_hash: str
+    """Of the module's weights."""
+    policy: FlatPolicy
+
+
 def inference_template(config: dict[str, Any]) -> InferenceParts:
     """Parts of the right shapes, to be filled with weights."""
     inference, policy = config["inference"], config["high_level"]
     settings = InferenceConfig(**{name: _as_tuple(value) for name, value in inference.items()})
-    key = jax.random.key(0)
-    observations = len(policy["fields"]) + 2 * settings.latent
-    families = len(config["contract"]["target_ranges"])
-    weights = np.zeros((settings.latent + 1, families), np.float32)
+    ranges = config["contract"]["target_ranges"]
+    weights = np.zeros((settings.latent + 1, len(ranges)), np.float32)
     return InferenceParts(
-        module=InferenceModule(settings, 1, key),
-        high_level=HighLevelPolicy(
-            _actor_template(observations, 1, policy), tuple(policy["fields"]), tuple(policy["scales"])
-        ),
-        probe=Probe(np.zeros(families, np.int32), weights, weights),
+        module=InferenceModule(settings, 1, jax.random.key(0)),
+        high_level=_policy_template(settings.latent, policy),
+        told_policy=_policy_template(2 * len(ranges), policy),
+        probe=Probe(np.zeros(len(ranges), np.int32), weights, weights),
     )
 
 
@@ -76,13 +88,18 @@ def tracker_template(config: dict[str, Any]) -> Tracker:
     return Tracker(actor, config["max_distance"], config["max_speed"])
 
 
+def flat_template(config: dict[str, Any]) -> FlatPolicy:
+    """A flat policy of the right shapes, to be filled with weights."""
+    return FlatPolicy(_actor_template(config["observations"], config["actions"], config), config["reach"])
+
+
 def load_inference(reference: str) -> Inference:
     """A shipped inference artifact by name, or one in a folder; RebodyError if it cannot be read."""
     artifact = load_artifact(reference, "inference")
     with _understood(artifact):
         contract = Contract.from_config(artifact.config["contract"])
         parts = _fill(inference_template, artifact)
-        return Inference(artifact.name, contract, parts, MassDamper(**artifact.config["toy"]))
+        return Inference(artifact.name, contract, parts, make_toy(**artifact.config["toy"]))
 
 
 def load_tracker(reference: str) -> LoadedTracker:
@@ -90,6 +107,19 @@ def load_tracker(reference: str) -> LoadedTracker:
     artifact = load_artifact(reference, "tracker")
     with _understood(artifact):
         return LoadedTracker(artifact.name, artifact.config["robot"], _fill(tracker_template, artifact))
+
+
+def load_flat(reference: str) -> LoadedFlat:
+    """A shipped flat policy by name, or one in a folder; RebodyError if it cannot be read."""
+    artifact = load_artifact(reference, "flat")
+    with _understood(artifact):
+        config = artifact.config
+        return LoadedFlat(artifact.name, config["robot"], config["inference_hash"], _fill(flat_template, artifact))
+
+
+def task_code(target_ranges: Mapping[str, tuple[float, float]]) -> TaskCode:
+    """Targets divided by the largest of their family."""
+    return TaskCode(tuple((family_index(name), max(abs(end) for end in ends)) for name, ends in target_ranges.items()))
 
 
 def _fill(template: Callable[[dict[str, Any]], Tree], artifact: Artifact) -> Tree:
@@ -111,41 +141,9 @@ def _understood(artifact: Artifact) -> Iterator[None]:
         ) from error
 
 
-def check_fit(inference: Inference, robot: str, moving_fields: tuple[str, ...]) -> None:
-    """RebodyError if this module cannot work on this robot."""
-    inference.contract.check_body(robot, moving_fields, SLOTS)
-
-
-def build_agent(
-    kind: str, inference: Inference, tasks: Task | None = None, *, stride: int = 1, horizon: int = HORIZON
-) -> Agent:
-    """An agent of a named kind; `oracle` needs the tasks, the active ones [time, episode]."""
-    encoder = inference.parts.module.encoder
-    match kind:
-        case "reuse":
-            return ReuseAgent(
-                encoder=encoder,
-                stride=stride,
-                high_level=inference.parts.high_level,
-                toy=inference.toy,
-                family=_only_family(inference),
-                horizon=horizon,
-            )
-        case "oracle" if tasks is not None:
-            family, target = jnp.asarray(tasks.family), jnp.asarray(tasks.target)
-            return OracleAgent(encoder=encoder, stride=stride, tasks=Task(family, target))
-        case "idle":
-            return IdleAgent(encoder=encoder, stride=stride)
-    raise RebodyError(f"unknown agent '{kind}'. Agents are: reuse, oracle, idle.")
-
-
-def _only_family(inference: Inference) -> int:
-    family, *others = inference.contract.families
-    if others:
-        raise RebodyError(
-            f"'{inference.name}' tells several families apart; `reuse` can drive modules of one family so far."
-        )
-    return family
+def _policy_template(belief_size: int, config: dict[str, Any]) -> HighLevelPolicy:
+    observations = len(config["fields"]) + 2 * belief_size
+    return HighLevelPolicy(_actor_template(observations, 1, config), tuple(config["fields"]), tuple(config["scales"]))
 
 
 def _actor_template(observations: int, actions: int, config: dict[str, Any]) -> Actor:

@@ -1,5 +1,6 @@
 """Episodes of an agent on a toy (one compiled scan) and on robots (a loop on the host)."""
 
+from collections import deque
 from collections.abc import Callable
 
 import equinox as eqx
@@ -8,11 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from rebody.agents.agent import Agent, Carry, Observation, relative
-from rebody.agents.agent import Command as AgentCommand
+from rebody.agents.agent import Agent, Carry, Command, Observation
+from rebody.agents.controller import Controller
 from rebody.bodies.robot import RobotBatch, RobotSpec
 from rebody.bodies.toys import Disturbance, Toy
-from rebody.control.tracker import Command, Tracker
 from rebody.tasks import RewardForm, reward
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task
 
@@ -54,68 +54,75 @@ def rollout_on_toy(
 
 def rollout_on_robot(
     agent: Agent,
-    tracker: Tracker,
+    controller: Controller,
     spec: RobotSpec,
     tasks: Task,
     form: RewardForm,
     seeds: Int[np.ndarray, " episode"],
     on_frame: OnFrame | None = None,
+    tick_steps: int | None = None,
 ) -> Episodes:
     """Episodes on robots from x = 0 at rest with reset noise; `tasks` are the active ones, [time, episode].
 
     Nothing ends early: a fallen robot lies there and keeps scoring. `on_frame` is called at every control step.
+    The agent decides every `tick_steps` control steps (thesis mode, 6.3.3); default is every 0.1 s. What is
+    returned stays 0.1 s apart.
     """
     decisions, size = tasks.target.shape
+    per_decision = spec.steps_per_decision
     batch = RobotBatch(spec, size)
     for episode, seed in enumerate(seeds):
         batch.reset(np.random.default_rng(seed), np.arange(size) == episode)
-    previous = batch.qpos.copy()
-    carry, command = begin(agent, spec.observe(batch.qpos, previous))
+    trail = deque([batch.qpos.copy()], maxlen=per_decision + 1)  # over the last 0.1 s
+    carry, command = begin(agent, spec.observe(batch.qpos, trail[0]))
     fell, records = np.zeros(size, bool), []
-    for i in range(decisions):
-        for _ in range(spec.steps_per_decision):
-            follow(tracker, batch, command.subgoal)
-            fell |= batch.fallen
-            if on_frame is not None:
-                on_frame(batch, command.subgoal)
-        state = spec.observe(batch.qpos, previous)
-        previous = batch.qpos.copy()
-        task = jax.tree.map(lambda field, i=i: field[i], tasks)
-        earned = task_reward(task, state, form)
-        carry, following = decide(agent, carry, Observation(state, earned))
-        records.append((state, earned, carry.belief, command.subgoal))
-        command = following
-    stacked = jax.tree.map(lambda *steps: np.stack(steps), *records)
-    state, earned, belief, subgoal = stacked
+    for step in range(1, decisions * per_decision + 1):
+        held = command.subgoal
+        follow(controller, batch, held, carry.belief)
+        fell |= batch.fallen
+        if on_frame is not None:
+            on_frame(batch, held)
+        trail.append(batch.qpos.copy())
+        is_tick, is_recorded = step % (tick_steps or per_decision) == 0, step % per_decision == 0
+        if not (is_tick or is_recorded):
+            continue
+        state = spec.observe(batch.qpos, trail[0])
+        i = (step - 1) // per_decision
+        earned = task_reward(Task(tasks.family[i], tasks.target[i]), state, form)
+        if is_tick:
+            carry, command = decide(agent, carry, Observation(state, earned))
+        if is_recorded:
+            records.append((state, earned, carry.belief, held))
+    state, earned, belief, subgoal = jax.tree.map(lambda *steps: np.stack(steps), *records)
     return Episodes(state, earned, belief, subgoal, fell)
 
 
-def follow(tracker: Tracker, batch: RobotBatch, subgoal: Subgoal) -> None:
-    """One control step towards a subgoal, made relative to where each robot is now."""
-    spec = batch.spec
-    joints = spec.joint_state(batch.qpos, batch.qvel)
-    batch.step(np.asarray(track(tracker, joints, subgoal, batch.x.astype(np.float32))))
+def follow(controller: Controller, batch: RobotBatch, subgoal: Subgoal, belief: Belief | None = None) -> None:
+    """One control step of every robot."""
+    joints = batch.spec.joint_state(batch.qpos, batch.qvel)
+    batch.step(np.asarray(joint_action(controller, joints, batch.x.astype(np.float32), subgoal, belief)))
 
 
 @eqx.filter_jit
-def track(
-    tracker: Tracker,
+def joint_action(
+    controller: Controller,
     joints: Float[AnyArray, "*episode joint"],
-    subgoal: Subgoal,
     x: Float[AnyArray, "*episode"],
+    subgoal: Subgoal,
+    belief: Belief | None,
 ) -> Float[AnyArray, "*episode action"]:
-    """Joint actions towards a subgoal from x [m]."""
-    return tracker(joints, Command(subgoal.slot, relative(subgoal, x)))
+    """What the controller does with the joints of robots at x [m]."""
+    return controller(joints, x, subgoal, belief)
 
 
 @eqx.filter_jit
-def begin(agent: Agent, state: GlobalState) -> tuple[Carry, AgentCommand]:
+def begin(agent: Agent, state: GlobalState) -> tuple[Carry, Command]:
     """`Agent.begin`, compiled."""
     return agent.begin(state)
 
 
 @eqx.filter_jit
-def decide(agent: Agent, carry: Carry, observation: Observation) -> tuple[Carry, AgentCommand]:
+def decide(agent: Agent, carry: Carry, observation: Observation) -> tuple[Carry, Command]:
     """`Agent.decide`, compiled."""
     return agent.decide(carry, observation)
 

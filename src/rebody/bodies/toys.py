@@ -5,13 +5,16 @@ or follow the thesis' noise (6.4-6.5); both are off in a nominal toy.
 """
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float, PRNGKeyArray
 
+from rebody.errors import RebodyError
 from rebody.types import DECISION_DT, AnyArray, GlobalState
 
 
@@ -145,3 +148,19 @@ def _move(state: ToyState, drift, force, time, position_noise) -> ToyState:
     vx = drift + disturbance.ripple_amplitude * jnp.sin(phase)
     x = state.x + DECISION_DT * vx + position_noise
     return ToyState(x, vx, drift, force, time, disturbance)
+
+
+TOYS: dict[str, Callable[..., Toy]] = {"mass-damper": MassDamper, "position": PositionToy}
+
+
+def make_toy(kind: str, **settings: float) -> Toy:
+    """A toy by its name in `TOYS`; RebodyError if there is none."""
+    if kind not in TOYS:
+        raise RebodyError(f"unknown toy '{kind}'. Toys are: {', '.join(TOYS)}.")
+    return TOYS[kind](**settings)
+
+
+def describe_toy(toy: Toy) -> dict[str, Any]:
+    """What `make_toy` needs to make it again."""
+    kind = next(name for name, make in TOYS.items() if make is type(toy))
+    return {"kind": kind, **asdict(toy)}

@@ -42,6 +42,7 @@ def parse(arguments: list[str]) -> Any:
     """The command with its options; prints help or usage and exits where tyro does."""
     from rebody.cli.demo import Demo
     from rebody.cli.evaluate import Evaluate
+    from rebody.cli.figure import Figures
     from rebody.cli.listing import List
     from rebody.cli.run import RunTask
     from rebody.cli.train import train_command
@@ -52,6 +53,7 @@ def parse(arguments: list[str]) -> Any:
         | Annotated[RunTask, tyro.conf.subcommand("run")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
         | train
+        | Annotated[Figures, tyro.conf.subcommand("figure")]
         | Annotated[List, tyro.conf.subcommand("list")]
     )
     return tyro.cli(commands, prog="rebody", args=arguments, description=DESCRIPTION)

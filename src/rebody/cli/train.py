@@ -8,6 +8,7 @@ import tyro
 from rich.console import Console
 
 from rebody.errors import RebodyError
+from rebody.training.flat import FlatConfig, train_flat
 from rebody.training.inference import PRESETS, MetaConfig, train_inference
 from rebody.training.tracker import TrackerConfig, train_tracker
 
@@ -61,6 +62,32 @@ class TrainTracker:
         _show_card(folder)
 
 
+@dataclass(frozen=True)
+class TrainFlat:
+    """Train a policy without hierarchy on a robot, on the beliefs of a frozen module (thesis 6.3.2)."""
+
+    robot: str
+    """Name of the robot (see `rebody list`)."""
+    out: Path
+    """Folder of the run, and of the artifact that it becomes."""
+    inference: str = "position"
+    """Inference artifact: a shipped name or a folder."""
+    seed: int = 0
+    """Seed of everything that is random."""
+    resume: bool = False
+    """Go on with the run in --out."""
+    init_from: str | None = None
+    """Start from the network of this flat artifact."""
+    config: Annotated[FlatConfig, tyro.conf.arg(name="")] = field(default_factory=FlatConfig)
+
+    def run(self) -> None:
+        """Train, save, say where."""
+        folder = train_flat(
+            self.robot, self.inference, self.config, self.out, self.seed, resume=self.resume, init_from=self.init_from
+        )
+        _show_card(folder)
+
+
 def train_command(arguments: list[str]) -> type:
     """The type of `rebody train`, its defaults those of the preset that the command line names.
 
@@ -73,7 +100,8 @@ def train_command(arguments: list[str]) -> type:
     # made here, since the defaults are known only now
     inference: Any = Annotated[TrainInference, tyro.conf.subcommand("inference", default=default, prefix_name=False)]
     tracker: Any = Annotated[TrainTracker, tyro.conf.subcommand("tracker", prefix_name=False)]
-    command: Any = Annotated[inference | tracker, tyro.conf.arg(name="")]
+    flat: Any = Annotated[TrainFlat, tyro.conf.subcommand("flat", prefix_name=False)]
+    command: Any = Annotated[inference | tracker | flat, tyro.conf.arg(name="")]
     doc = "Train a part; every shipped artifact is made by these commands."
     return make_dataclass("Train", [("command", command)], frozen=True, namespace={"run": _run, "__doc__": doc})
 

@@ -2,11 +2,17 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from rebody.agents.parts import HORIZON, load_inference, load_tracker
+import tyro
+
+from rebody.agents.build import AGENTS, HORIZON, check_agent
+from rebody.agents.parts import load_flat, load_inference, load_tracker
 from rebody.bodies import load_robot
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import POINT_MASS, Trial
+
+AGENT_HELP = "; ".join(f"{name}: {what}" for name, what in AGENTS.items())
 
 
 @dataclass(frozen=True)
@@ -17,31 +23,36 @@ class TrialOptions:
     """Body (see `rebody list`)."""
     inference: str = "position"
     """Inference artifact: a shipped name or a folder."""
-    agent: str = "reuse"
-    """reuse, oracle (told the task) or idle (knows nothing and stands still)."""
+    agent: Annotated[str, tyro.conf.arg(help=AGENT_HELP)] = "reuse"
     tracker: str | None = None
     """Tracker artifact; default tracker-ROBOT."""
+    flat: str | None = None
+    """Policy of agent `flat`; default flat-ROBOT."""
     seconds: float = 20.0
     """Length of an episode."""
     stride: int = 1
-    """Decisions for which a subgoal is held."""
-    horizon: int = HORIZON
-    """Decisions that `reuse` looks ahead; 1 is the thesis."""
+    """Decisions for which a subgoal is held; in thesis mode control steps from one decision to the next."""
+    horizon: int | None = None
+    """Decisions that `reuse` looks ahead; default 15, in thesis mode 1."""
+    thesis: bool = False
+    """Thesis mode (6.3.3): the module hears of the world once per stride only."""
 
     def load(self) -> Trial:
         """Load the parts; RebodyError where an option makes no sense or a part cannot be had."""
-        for name in ("stride", "horizon"):
-            if getattr(self, name) < 1:
-                raise RebodyError(f"--{name} must be at least 1.")
+        check_agent(self.agent)
+        if self.stride < 1 or (self.horizon is not None and self.horizon < 1):
+            raise RebodyError(f"--{'stride' if self.stride < 1 else 'horizon'} must be at least 1.")
         if not math.isfinite(self.seconds):
             raise RebodyError(f"--seconds must be finite, not {self.seconds:g}.")
-        on_toy = self.robot == POINT_MASS
+        on_robot, is_flat = self.robot != POINT_MASS, self.agent == "flat"
         return Trial(
             agent=self.agent,
-            robot=None if on_toy else load_robot(self.robot),
+            robot=load_robot(self.robot) if on_robot else None,
             inference=load_inference(self.inference),
-            tracker=None if on_toy else load_tracker(self.tracker or f"tracker-{self.robot}"),
+            tracker=load_tracker(self.tracker or f"tracker-{self.robot}") if on_robot else None,
+            flat=load_flat(self.flat or f"flat-{self.robot}") if on_robot and is_flat else None,
             seconds=self.seconds,
             stride=self.stride,
-            horizon=self.horizon,
+            horizon=self.horizon or (1 if self.thesis else HORIZON),
+            thesis=self.thesis,
         )

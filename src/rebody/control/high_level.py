@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from rebody.control.sac import Actor
-from rebody.types import AnyArray, Belief, GlobalState
+from rebody.types import AnyArray, Belief, GlobalState, Task
 
 
 class HighLevelPolicy(eqx.Module):
@@ -18,6 +18,20 @@ class HighLevelPolicy(eqx.Module):
     def __call__(self, state: GlobalState, belief: Belief) -> Float[AnyArray, "*batch action"]:
         """The most likely action, in [-1, 1]."""
         return self.actor(policy_observation(state, belief, self.fields, self.scales))
+
+
+class TaskCode(eqx.Module):
+    """A task in the shape of a belief without doubt, for a policy that is told it."""
+
+    scales: tuple[tuple[int, float], ...] = eqx.field(static=True)
+    """Each family's index, and what its targets are divided by [m, m/s, rad]."""
+
+    def __call__(self, task: Task) -> Belief:
+        """One-hot of the family, then the same times the scaled target; mean [*batch, 2 families]."""
+        is_on = jnp.stack([(task.family == family) for family, _ in self.scales], axis=-1).astype(jnp.float32)
+        target = task.target[..., None] / jnp.asarray([scale for _, scale in self.scales])
+        mean = jnp.concatenate([is_on, is_on * target], axis=-1)
+        return Belief(mean, jnp.zeros_like(mean))
 
 
 def policy_observation(

@@ -4,7 +4,9 @@ State in, state out: `update(state, batch, key, config) -> (state, metrics)`. Tw
 layer normalisation, a learned temperature, and a slowly averaged actor for evaluation.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -12,6 +14,7 @@ import jax.numpy as jnp
 import optax
 from jaxtyping import Float, PRNGKeyArray
 
+from rebody.errors import RebodyError
 from rebody.nn import MLP, MultiScale
 from rebody.types import AnyArray, Tree
 
@@ -170,6 +173,36 @@ def update(
     state, temperature_metrics = _update_temperature(state, actor_metrics["entropy"], batch, config)
     state = _update_averages(state, config)
     return state, critic_metrics | actor_metrics | temperature_metrics
+
+
+def update_many(
+    state: SACState,
+    batch_of: Callable[[Any, PRNGKeyArray], SACBatch],
+    inputs: Any,
+    keys: PRNGKeyArray,
+    config: SACConfig,
+) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
+    """An update per key in one scan; `batch_of` makes its batch from one entry of `inputs` and a key.
+
+    Returns the mean of each metric.
+    """
+    arrays, static = eqx.partition(state, eqx.is_array)
+
+    def step(arrays, inputs):
+        inputs, key = inputs
+        batch_key, update_key = jax.random.split(key)
+        updated, metrics = update(eqx.combine(arrays, static), batch_of(inputs, batch_key), update_key, config)
+        return eqx.filter(updated, eqx.is_array), metrics
+
+    arrays, metrics = jax.lax.scan(step, arrays, (inputs, keys))
+    return eqx.combine(arrays, static), jax.tree.map(jnp.mean, metrics)
+
+
+def take_over(state: SACState, actor: Actor, name: str) -> SACState:
+    """The state with a trained actor in place of its own; RebodyError if its sizes differ."""
+    if jax.tree.map(jnp.shape, actor) != jax.tree.map(jnp.shape, state.actor):
+        raise RebodyError(f"cannot start from '{name}': its networks have other sizes than these settings.")
+    return eqx.tree_at(lambda s: (s.actor, s.averaged_actor), state, (actor, actor))
 
 
 def _update_critics(state, batch, key, config):

@@ -1,20 +1,25 @@
 """Every task once per evaluation seed, with the oracle's return beside it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax
 import numpy as np
 
 from rebody.agents.agent import Agent
-from rebody.agents.parts import HORIZON, Inference, LoadedTracker, build_agent, check_fit
+from rebody.agents.build import HORIZON, build_agent, check_agent, check_fit
+from rebody.agents.controller import Controller, FlatController, TrackerController
+from rebody.agents.parts import Inference, LoadedFlat, LoadedTracker
 from rebody.agents.rollout import Episodes, OnFrame, rollout_on_robot, rollout_on_toy
 from rebody.bodies import RobotSpec
+from rebody.bodies.toys import Toy
 from rebody.errors import RebodyError
 from rebody.evaluation.results import Results, episode_results
+from rebody.store import tree_hash
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, Task
 
 POINT_MASS = "point-mass"
+THESIS_AGENTS = ("reuse", "readout", "bayes")
 
 
 @dataclass(frozen=True)
@@ -26,9 +31,16 @@ class Trial:
     robot: RobotSpec | None
     """None for the point mass."""
     tracker: LoadedTracker | None
+    flat: LoadedFlat | None = None
+    """The policy of agent `flat`."""
+    toy: Toy | None = None
+    """A point mass other than the one that the module learned on."""
     seconds: float = 20.0
     stride: int = 1
+    """Decisions that a subgoal is held; in thesis mode control steps from one decision to the next."""
     horizon: int = HORIZON
+    thesis: bool = False
+    """The encoder ticks once per stride (6.3.3)."""
     on_frame: OnFrame | None = None
     """Called at every control step of a robot, to film it."""
 
@@ -39,23 +51,24 @@ class Trial:
 
     @property
     def decisions(self) -> int:
-        """Decisions of one episode."""
+        """Times 0.1 s of one episode."""
         return round(self.seconds / DECISION_DT)
 
 
 def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
     """Judge an agent on every task, once per evaluation seed 0 to `seeds` - 1.
 
-    RebodyError where module, tracker, tasks and robot do not fit together.
+    RebodyError where module, policies, tasks and robot do not fit together.
     """
-    _check(trial, specs)
+    check_trial(trial, specs)
     specs = [spec for spec in specs for _ in range(seeds)]
     episode_seeds = np.tile(np.arange(seeds), len(specs) // seeds)
     tasks = active_tasks(specs, trial.decisions, DECISION_DT)
-    episodes = _run(trial, trial.agent, tasks, episode_seeds, trial.on_frame)
-    oracle = _oracle_returns(trial, tasks, episode_seeds, episodes)
-    read = trial.inference.parts.probe(episodes.belief)
-    results = episode_results(specs, episode_seeds, tasks, episodes, read, oracle)
+    agent = trial_agent(trial, tasks)
+    episodes = run_trial(trial, agent, tasks, episode_seeds)
+    oracle = episodes if trial.agent == "oracle" else _run_oracle(trial, tasks, episode_seeds)
+    read = agent.reader(episodes.belief)
+    oracle_returns = None if oracle is None else np.asarray(oracle.reward).sum(axis=0)
     return Results(
         robot=trial.robot_name,
         agent=trial.agent,
@@ -64,48 +77,78 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
         control_dt=trial.robot.control_dt if trial.robot else DECISION_DT,
         stride=trial.stride,
         horizon=trial.horizon,
-        episodes=results,
+        thesis=trial.thesis,
+        episodes=episode_results(specs, episode_seeds, tasks, episodes, read, oracle_returns),
     )
 
 
-def _run(trial: Trial, kind: str, tasks: Task, seeds: np.ndarray, on_frame: OnFrame | None = None) -> Episodes:
-    agent: Agent = build_agent(kind, trial.inference, tasks, stride=trial.stride, horizon=trial.horizon)
+def trial_agent(trial: Trial, tasks: Task) -> Agent:
+    """The agent of a trial; `tasks` are the active ones, [time, episode], which `oracle` is told."""
+    stride = 1 if trial.thesis else trial.stride
+    return build_agent(trial.agent, trial.inference, tasks, stride=stride, horizon=trial.horizon)
+
+
+def run_trial(trial: Trial, agent: Agent, tasks: Task, seeds: np.ndarray) -> Episodes:
+    """Episodes as arrays, 0.1 s apart; `tasks` are the active ones, [time, episode]."""
     form = trial.inference.contract.reward
     if trial.robot is None:
-        episodes = rollout_on_toy(agent, trial.inference.toy, tasks, form)
+        episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, form)
     else:
-        assert trial.tracker is not None
-        episodes = rollout_on_robot(agent, trial.tracker.tracker, trial.robot, tasks, form, seeds, on_frame)
+        tick_steps = trial.stride if trial.thesis else None
+        episodes = rollout_on_robot(
+            agent, _controller(trial), trial.robot, tasks, form, seeds, trial.on_frame, tick_steps
+        )
     return jax.tree.map(np.asarray, episodes)
 
 
-def _oracle_returns(trial: Trial, tasks: Task, seeds: np.ndarray, episodes: Episodes) -> np.ndarray | None:
-    """Returns of the same tracker told the true target; a toy has no oracle."""
-    if trial.robot is None:
+def _run_oracle(trial: Trial, tasks: Task, seeds: np.ndarray) -> Episodes | None:
+    """What the same body would have done, told the task; None for a robot without a tracker."""
+    if trial.robot is not None and trial.tracker is None:
         return None
-    oracle = episodes if trial.agent == "oracle" else _run(trial, "oracle", tasks, seeds)
-    return np.asarray(oracle.reward).sum(axis=0)
+    told = replace(trial, agent="oracle", thesis=False, stride=1 if trial.thesis else trial.stride, on_frame=None)
+    return run_trial(told, trial_agent(told, tasks), tasks, seeds)
 
 
-def _check(trial: Trial, specs: list[TaskSpec]) -> None:
+def _controller(trial: Trial) -> Controller:
+    if trial.agent == "flat":
+        assert trial.flat is not None
+        return FlatController(trial.flat.policy)
+    assert trial.tracker is not None
+    return TrackerController(trial.tracker.tracker)
+
+
+def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
+    """RebodyError where module, policies, tasks and robot do not fit together."""
+    check_agent(trial.agent)
     if trial.seconds < 3.0:
         raise RebodyError(f"--seconds {trial.seconds:g} is too short: final errors need the last 2 s of at least 3.")
+    if trial.thesis and trial.agent not in THESIS_AGENTS:
+        raise RebodyError(f"thesis mode is for the agents {', '.join(THESIS_AGENTS)}, not for '{trial.agent}'.")
+    _check_tasks(trial, specs)
+    if trial.robot is None:
+        if trial.agent == "flat":
+            raise RebodyError("agent 'flat' moves the joints of a robot, and a point mass has none.")
+        return
+    check_fit(trial.inference, trial.robot.name, trial.robot.moving_fields)
+    for part in (trial.tracker, trial.flat):
+        if part is not None and part.robot != trial.robot.name:
+            raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{trial.robot.name}'.")
+    if trial.flat is not None and trial.flat.inference_hash != tree_hash(trial.inference.parts.module):
+        raise RebodyError(
+            f"flat policy '{trial.flat.name}' was trained on the beliefs of another module than "
+            f"'{trial.inference.name}'. Use that one (its card names it), or train it anew."
+        )
+
+
+def _check_tasks(trial: Trial, specs: list[TaskSpec]) -> None:
     known = trial.inference.contract.target_ranges
     for spec in specs:
         if spec.switch is not None and round(spec.switch.at_s / DECISION_DT) >= trial.decisions:
             raise RebodyError(f"a switch at {spec.switch.at_s:g} s is not within an episode of {trial.seconds:g} s.")
         for family in {spec.family, spec.last.family}:
-            if family not in known and trial.agent == "reuse":
+            # a robot's oracle and an idle one need no module
+            if family not in known and (trial.robot is None or trial.agent not in ("oracle", "idle")):
                 raise RebodyError(
                     f"'{trial.inference.name}' was trained on {', '.join(known)} and cannot infer '{family}'. "
                     "Choose tasks or a module that fit (rebody list)."
                 )
-    if trial.robot is None and trial.agent != "reuse":
-        raise RebodyError(f"agent '{trial.agent}' drives a tracker, which a point mass does not have; use reuse.")
-    if trial.robot is None or trial.tracker is None:
-        return
-    if trial.tracker.robot != trial.robot.name:
-        raise RebodyError(
-            f"tracker '{trial.tracker.name}' was trained on '{trial.tracker.robot}', not on '{trial.robot.name}'."
-        )
-    check_fit(trial.inference, trial.robot.name, trial.robot.moving_fields)

@@ -43,7 +43,7 @@ class EpisodeResult:
     cluster: list[int]
     latent: list[list[float]]
     subgoal_family: list[str]
-    subgoal: list[float]
+    subgoal: list[float | None]
     fell: bool
     return_: float
     oracle_return: float | None
@@ -71,6 +71,7 @@ class Results:
     control_dt: float
     stride: int
     horizon: int
+    thesis: bool
     episodes: list[EpisodeResult]
 
     @cached_property
@@ -136,7 +137,7 @@ def episode_results(
                 cluster=[0] * len(position),  # a single Gaussian prior has one
                 latent=[_floats(row) for row in episodes.belief.mean[:, i]],
                 subgoal_family=names[np.asarray(episodes.subgoal.slot[:, i])].tolist(),
-                subgoal=_floats(episodes.subgoal.value[:, i]),
+                subgoal=[None if np.isnan(value) else value for value in _floats(episodes.subgoal.value[:, i])],
                 fell=bool(episodes.fell[i]),
                 return_=float(np.sum(episodes.reward[:, i])),
                 oracle_return=None if oracle_returns is None else float(oracle_returns[i]),

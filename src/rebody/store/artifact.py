@@ -20,8 +20,9 @@ from rebody.store.trees import tree_to_arrays
 FORMAT_VERSION = 1
 SHIPPED = Path(__file__).parents[1] / "artifacts"
 
-WEIGHTS, CONFIG, CARD, MANIFEST = "weights.safetensors", "config.json", "card.md", "manifest.json"
-HASHED = (WEIGHTS, CONFIG, CARD)  # the manifest holds the others' hashes
+WEIGHTS, CONFIG, CARD, LOG = "weights.safetensors", "config.json", "card.md", "log.csv"
+HASHED = (WEIGHTS, CONFIG, CARD, LOG)
+MANIFEST = "manifest.json"  # holds the others' hashes
 
 
 @dataclass(frozen=True)
@@ -34,9 +35,10 @@ class Artifact:
     config: dict[str, Any]  # all that rebuilds the object, contract included
     arrays: dict[str, np.ndarray]  # weights by dotted name: see `arrays_into_tree`
     card: str  # Markdown: what it is and how it was made
+    log: str  # CSV: what training measured, a row per iteration
 
 
-def save_artifact(path: Path, *, kind: str, config: dict[str, Any], weights: Any, card: str) -> Path:
+def save_artifact(path: Path, *, kind: str, config: dict[str, Any], weights: Any, card: str, log: str) -> Path:
     """Write an artifact into the folder `path`; an older artifact there stays readable until the end.
 
     `weights` is a pytree or a dict of arrays; `config` must survive JSON. Other files in the folder are kept.
@@ -53,6 +55,7 @@ def save_artifact(path: Path, *, kind: str, config: dict[str, Any], weights: Any
         WEIGHTS: safetensors.numpy.save(arrays),
         CONFIG: _to_json(config),
         CARD: card.encode(),
+        LOG: log.encode(),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_name(f".{path.name}.new")
@@ -85,6 +88,7 @@ def load_artifact(reference: str | Path, kind: str) -> Artifact:
         config=_parse_object(content[CONFIG], path / CONFIG),
         arrays=_parse_weights(content[WEIGHTS], path / WEIGHTS),
         card=content[CARD].decode(),
+        log=content[LOG].decode(),
     )
 
 

@@ -4,6 +4,8 @@ A pipeline gives a declared state with an `iteration` and a function that takes 
 is about not losing what it does.
 """
 
+import csv
+import io
 import json
 import signal
 import time
@@ -47,6 +49,8 @@ class Run:
         self.checkpoint_every_s = checkpoint_every_s
         self.wall_s = 0.0
         """Seconds of training so far, over all resumptions."""
+        self.history: list[Metrics] = []
+        """What every iteration measured."""
         if out.exists() and not out.is_dir():
             raise RebodyError(f"{out} is a file; a run needs a folder. Choose another --out.")
         if not resume and ((out / "checkpoint").exists() or (out / "manifest.json").exists()):
@@ -68,8 +72,19 @@ class Run:
                 f"cannot resume {self.out}: it was begun with other settings ({', '.join(changed)}). "
                 "Use the same ones, or choose another --out."
             )
-        self.wall_s = meta["wall_s"]
+        self.wall_s, self.history = meta["wall_s"], meta["history"]
         return state
+
+    @property
+    def log(self) -> str:
+        """CSV: a row per iteration, an empty field where nothing was measured."""
+        names = list(dict.fromkeys(name for metrics in self.history for name in metrics))
+        table = io.StringIO()
+        writer = csv.DictWriter(table, ["iteration", *names], lineterminator="\n")
+        writer.writeheader()
+        for i, metrics in enumerate(self.history):
+            writer.writerow({"iteration": i + 1} | {name: f"{value:.6g}" for name, value in metrics.items()})
+        return table.getvalue()
 
     def loop(
         self, state: State, iterate: Callable[[State], tuple[State, Metrics]], iterations: int, label: str
@@ -79,7 +94,8 @@ class Run:
         with (
             progress(label, iterations, int(state.iteration)) as show,
             _interrupts() as interrupted,
-            SummaryWriter(str(self.out / "events")) as writer,
+            # a killed run has told of turns that it takes again
+            SummaryWriter(str(self.out / "events"), purge_step=int(state.iteration) + 1) as writer,
         ):
             while int(state.iteration) < iterations:
                 state, metrics = iterate(state)
@@ -101,9 +117,11 @@ class Run:
 
     def _save(self, state: RunState) -> None:
         _check_finite(_faults(state), self.out)  # the last update may have broken what no loss shows yet
-        save_checkpoint(self._checkpoint, state, {"settings": self.settings, "wall_s": self.wall_s})
+        meta = {"settings": self.settings, "wall_s": self.wall_s, "history": self.history}
+        save_checkpoint(self._checkpoint, state, meta)
 
     def _log(self, writer: SummaryWriter, metrics: Metrics, iteration: int) -> None:
+        self.history.append(metrics)
         for name, value in metrics.items():
             writer.add_scalar(name, value, iteration)
 

@@ -1,11 +1,12 @@
 """Settings of a meta-training run."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from rebody.bodies.toys import Randomisation
 from rebody.control.sac import SACConfig
 from rebody.inference import InferenceConfig
-from rebody.tasks import RewardForm, TaskDistribution
+from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
 
 
 @dataclass(frozen=True)
@@ -21,9 +22,11 @@ class MetaConfig:
     sac: SACConfig
     """The high-level policy's learning."""
     policy_fields: tuple[str, ...]
-    """Fields of the global state that the policy sees."""
+    """Fields of the global state that the policies see."""
     policy_scales: tuple[float, ...]
     """What each of them is divided by [m, m/s]."""
+    toy: Literal["mass-damper", "position"] = "mass-damper"
+    """The body that everything is learned on."""
     arrival: float = 0.0
     """Added to the scaled reward r / reward_scale of the policy's learning when r = 0, half of it at r = -0.1. It
     is a function of the reward alone, and pulls the last centimetres."""
@@ -49,6 +52,12 @@ class MetaConfig:
     """Updates of encoder and decoder in an iteration."""
     policy_updates: int = 512
     """Updates of the policy in an iteration."""
+
+    @property
+    def target_ranges(self) -> dict[str, tuple[float, float]]:
+        """Smallest and largest target of each family, in the order of their indices."""
+        names = [FAMILIES[index].name for index in self.tasks.families]
+        return {name: self.tasks.target_range(name) for name in names}
 
     @property
     def inference_iterations(self) -> int:

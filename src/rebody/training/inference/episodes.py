@@ -11,7 +11,7 @@ from rebody.control.sac import Actor
 from rebody.inference import Encoder
 from rebody.tasks import reward
 from rebody.training.inference.config import MetaConfig
-from rebody.types import AnyArray, Belief, GlobalState, Transition
+from rebody.types import AnyArray, Belief, GlobalState, Task, Transition
 
 TURN_PROBABILITY = 0.15
 """Chance per decision that a wandering toy changes its mind."""
@@ -37,6 +37,7 @@ def roles(episodes: int, all_wander: bool) -> Roles:
 class Episodes(eqx.Module):
     """Episodes as learning needs them; states and beliefs have one entry more than actions."""
 
+    task: Task  # [*groups, episode]
     state: GlobalState  # [*groups, episode, time + 1]
     belief: Belief  # [*groups, episode, time + 1]
     action: Float[AnyArray, "*groups episode time action"]
@@ -81,18 +82,16 @@ def collect(
     walk = (body, seen, encoder.initial(shape), belief, held)
     keys = jax.random.split(walk_key, config.decisions)
     _, (states, beliefs, actions, rewards) = jax.lax.scan(decide, walk, keys)
-    time_major = Episodes(_prepend(seen, states), _prepend(belief, beliefs), actions, rewards)
-    return jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), time_major)
+    along = (_prepend(seen, states), _prepend(belief, beliefs), actions, rewards)
+    return Episodes(task, *jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), along))
 
 
 @eqx.filter_jit
 def refresh_beliefs(encoder: Encoder, episodes: Episodes) -> Episodes:
     """The same episodes with the beliefs that today's encoder holds along them."""
-    time_major = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 2, 0), episodes)
+    state, reward = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 2, 0), (episodes.state, episodes.reward))
     transitions = Transition(
-        jax.tree.map(lambda leaf: leaf[:-1], time_major.state),
-        time_major.reward,
-        jax.tree.map(lambda leaf: leaf[1:], time_major.state),
+        jax.tree.map(lambda leaf: leaf[:-1], state), reward, jax.tree.map(lambda leaf: leaf[1:], state)
     )
     shape = transitions.reward.shape[1:]
     _, beliefs = jax.lax.scan(

@@ -1,7 +1,9 @@
 """Presets: functions that return settings; the command line has the last word."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
+from rebody.bodies.toys import Randomisation
 from rebody.control.sac import SACConfig
 from rebody.inference import InferenceConfig
 from rebody.tasks import BaseTask, TaskDistribution
@@ -31,4 +33,22 @@ def position() -> MetaConfig:
     )
 
 
-PRESETS: dict[str, Callable[[], MetaConfig]] = {"position": position}
+def position_thesis() -> MetaConfig:
+    """The thesis' first experiment (6.3.1): positions in [0, 10] m, steps of at most 0.1 m, a latent of one number.
+
+    Nothing is randomised but where episodes start.
+    """
+    base = position()
+    return replace(
+        base,
+        toy="position",
+        tasks=TaskDistribution((BaseTask("goal", 0.0, 10.0),)),
+        inference=replace(base.inference, latent=1),
+        policy_fields=("x",),
+        policy_scales=(10.0,),
+        randomisation=Randomisation(ripple_amplitude=0.0, lag=0.0, gain=(1.0, 1.0)),
+        start=(12.0, 0.0),
+    )
+
+
+PRESETS: dict[str, Callable[[], MetaConfig]] = {"position": position, "position-thesis": position_thesis}

@@ -2,18 +2,17 @@
 
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rebody.agents.agent import ReuseAgent
-from rebody.agents.parts import InferenceParts
+from rebody.agents.agent import OracleAgent, ReuseAgent
+from rebody.agents.parts import InferenceParts, task_code
 from rebody.agents.rollout import Episodes, rollout_on_toy
-from rebody.bodies.toys import Disturbance, MassDamper, no_disturbance
-from rebody.control.high_level import HighLevelPolicy
-from rebody.control.sac import Actor
-from rebody.inference import InferenceModule
+from rebody.bodies.toys import Disturbance, Toy, describe_toy, no_disturbance
 from rebody.inference.contract import Contract
 from rebody.inference.probe import Probe, fit_probe
 from rebody.store import save_artifact
@@ -31,39 +30,36 @@ PROBED_FROM = 20
 """A probe is fitted on the beliefs from this decision on."""
 
 
-def measure(module: InferenceModule, actor: Actor, toy: MassDamper, config: MetaConfig) -> dict[str, float]:
-    """Final error on held-out tasks [m, m/s], return, and R^2 of a linear reading of the target."""
-    parts = _parts(module, actor, config)
+def measure(parts: InferenceParts, toy: Toy, config: MetaConfig) -> dict[str, float]:
+    """Final error on held-out tasks [m, m/s], return, the oracle's, and R^2 of a linear reading of the target."""
     fitted = _rollout(parts, toy, config, seed=1)
     tasks, episodes = _rollout(parts, toy, config, seed=2)
     figures = {}
-    for name in config_families(config):
+    for name in config.target_ranges:
         of_family = np.flatnonzero(tasks.family == family_index(name))
         errors = [final_error(name, float(tasks.target[i]), np.asarray(episodes.state.x)[:, i]) for i in of_family]
         figures[f"{name} median"] = float(np.median(errors))
         figures[f"{name} p95"] = float(np.percentile(errors, 95))
     figures["return"] = float(episodes.reward.sum(0).mean())
+    figures["oracle return"] = float(_rollout(parts, toy, config, seed=2, told=True)[1].reward.sum(0).mean())
     probe = _fit(*fitted)
     _, read = probe(jax.tree.map(lambda leaf: leaf[PROBED_FROM:], episodes.belief))
     figures["target R2"] = float(1 - np.var(read - tasks.target) / np.var(tasks.target))
     return figures
 
 
-def save_inference(
-    module: InferenceModule, actor: Actor, toy: MassDamper, config: MetaConfig, run: Run, seed: int, title: str
-) -> Path:
+def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run, seed: int, title: str) -> Path:
     """Fit the probe, measure, write artifact and card."""
-    parts = _parts(module, actor, config)
-    figures = measure(module, actor, toy, config)
+    figures = measure(parts, toy, config)
     rough = _rollout(parts, toy, config, seed=3, disturbed=True)
     probe = _fit(*rough)
     contract = Contract(
         fields=config.inference.fields,
         window=config.inference.window,
-        target_ranges={name: config.tasks.target_range(name) for name in config_families(config)},
+        target_ranges=config.target_ranges,
         reward=config.reward,
     )
-    parts = InferenceParts(parts.module, parts.high_level, probe)
+    parts = eqx.tree_at(lambda p: p.probe, parts, probe)
     stored = {
         "contract": contract.to_config(),
         "inference": asdict(config.inference),
@@ -73,7 +69,7 @@ def save_inference(
             "hidden": config.sac.hidden,
             "projections": config.sac.projections,
         },
-        "toy": {"mass": toy.mass, "damping": toy.damping, "max_force": toy.max_force},
+        "toy": describe_toy(toy),
         "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
     }
     units = {family.name: family.unit for family in FAMILIES}
@@ -87,39 +83,27 @@ def save_inference(
         f"on {', '.join(contract.target_ranges)} tasks in {steps:,} toy steps. No robot took part."
     )
     return save_artifact(
-        run.out, kind="inference", config=stored, weights=parts, card=card(title, what, run, seed, rows)
+        run.out, kind="inference", config=stored, weights=parts, card=card(title, what, run, seed, rows), log=run.log
     )
-
-
-def config_families(config: MetaConfig) -> list[str]:
-    """Names of the families that a run trains on, in the order of their indices."""
-    return [FAMILIES[index].name for index in config.tasks.families]
-
-
-def _parts(module: InferenceModule, actor: Actor, config: MetaConfig) -> InferenceParts:
-    unfitted = jnp.zeros((config.inference.latent + 1, len(config.tasks.families)))
-    probe = Probe(jnp.asarray(config.tasks.families), unfitted, unfitted)
-    return InferenceParts(module, HighLevelPolicy(actor, config.policy_fields, config.policy_scales), probe)
 
 
 def _rollout(
-    parts: InferenceParts, toy: MassDamper, config: MetaConfig, seed: int, disturbed: bool = False
+    parts: InferenceParts, toy: Toy, config: MetaConfig, seed: int, *, disturbed: bool = False, told: bool = False
 ) -> tuple[Task, Episodes]:
-    """Held-out tasks and what the toy did on them; the seeds are none that training uses."""
+    """Held-out tasks and what the toy (or its oracle) did on them; the seeds are none that training uses."""
     task_key, disturbance_key = jax.random.split(jax.random.fold_in(jax.random.key(2**31 - 1), seed))
     task = config.tasks.sample(task_key, (HELD_OUT,))
-    agent = ReuseAgent(
-        encoder=parts.module.encoder,
-        stride=1,
-        high_level=parts.high_level,
-        toy=toy,
-        family=config.tasks.families[0],
-        horizon=1,
-    )
+    lasting = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (DECISIONS, HELD_OUT)), task)
+    listens: Any = {"inferrer": parts.module.encoder, "reader": parts.probe, "stride": 1}
+    if told:
+        code = task_code(config.target_ranges)
+        agent = OracleAgent(**listens, told_policy=parts.told_policy, task_code=code, tasks=lasting)
+    else:
+        family = config.tasks.families[0]
+        agent = ReuseAgent(**listens, high_level=parts.high_level, toy=toy, family=family, horizon=1)
     disturbance: Disturbance = (
         config.randomisation.sample(disturbance_key, (HELD_OUT,)) if disturbed else no_disturbance((HELD_OUT,))
     )
-    lasting = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (DECISIONS, HELD_OUT)), task)
     episodes = rollout_on_toy(agent, toy, lasting, config.reward, disturbance)
     return jax.tree.map(np.asarray, (task, episodes))
 

@@ -13,19 +13,20 @@ import jax.numpy as jnp
 import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
-from rebody.agents.parts import load_inference
-from rebody.bodies.toys import MassDamper
+from rebody.agents.parts import InferenceParts, load_inference, task_code
+from rebody.bodies.toys import Toy, make_toy
 from rebody.control import sac
-from rebody.control.high_level import policy_observation
+from rebody.control.high_level import HighLevelPolicy, policy_observation
 from rebody.control.sac import SACBatch, SACState
 from rebody.errors import RebodyError
 from rebody.inference.module import Evidence, InferenceModule, loss
 from rebody.inference.prior import unit_gaussian
+from rebody.inference.probe import Probe
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, collect, refresh_beliefs, roles
 from rebody.training.inference.report import measure, save_inference
 from rebody.training.run import Metrics, Run
-from rebody.types import Transition
+from rebody.types import AnyArray, Transition
 
 EVALUATE_EVERY = 10
 BEGINS_AT_START = 0.3
@@ -37,7 +38,8 @@ class RunState(eqx.Module):
 
     module: InferenceModule
     optimiser: optax.OptState
-    sac: SACState
+    sac: SACState  # the high-level policy
+    told: SACState  # the same policy, told the task: the toy's oracle
     replay: Episodes  # [group, episode, time]
     iteration: Int[Array, ""]
 
@@ -56,43 +58,49 @@ def train_inference(
     RebodyError if `out` holds another run, or `init_from` has other sizes; Interrupted on Ctrl-C.
     """
     run = Run(out, asdict(config) | {"seed": seed, "init_from": init_from}, resume=resume)
-    toy, key = MassDamper(), jax.random.key(seed)
+    toy, key = make_toy(config.toy), jax.random.key(seed)
     state = run.restore(initial_state(config, toy, key, init_from))
     state = run.loop(state, lambda state: iterate(state, toy, config, key), config.iterations, "inference")
-    return save_inference(state.module, state.sac.averaged_actor, toy, config, run, seed, title)
+    return save_inference(trained_parts(state, config), toy, config, run, seed, title)
 
 
-def iterate(state: RunState, toy: MassDamper, config: MetaConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
+def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
     """One turn of the loop."""
     iteration = int(state.iteration)
     keys = jax.random.split(jax.random.fold_in(key, iteration), 3)
-    module, optimiser, policy = state.module, state.optimiser, state.sac
-    metrics = {}
+    module, optimiser, policy, told = state.module, state.optimiser, state.sac, state.told
 
     acting = roles(config.episodes, all_wander=iteration < config.wander_iterations)
     episodes = collect(module.encoder, policy.actor, toy, config, acting, keys[0])
-    replay, stored = store(state.replay, episodes, iteration)
+    metrics = {"return": episodes.reward[acting.decides].sum(-1).mean()}
+    replay, stored = store(state.replay, episodes, state.iteration)
     if iteration < config.inference_iterations:
-        module, optimiser, metrics = update_inference(module, optimiser, replay, stored, config, keys[1])
+        module, optimiser, inference_metrics = update_inference(module, optimiser, replay, stored, config, keys[1])
+        metrics |= inference_metrics
         replay = refresh_beliefs(module.encoder, replay)
     if iteration >= config.wander_iterations:
         policy, policy_metrics = update_policy(policy, replay, stored, config, keys[2])
-        metrics |= policy_metrics
+        told, told_metrics = update_policy(told, tell(replay, config), stored, config, keys[2])
+        metrics |= policy_metrics | {f"told/{name}": value for name, value in told_metrics.items()}
+    state = RunState(module, optimiser, policy, told, replay, state.iteration + 1)
     if (iteration + 1) % EVALUATE_EVERY == 0:
-        figures = measure(module, policy.averaged_actor, toy, config)
+        figures = measure(trained_parts(state, config), toy, config)
         metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
-
-    state = RunState(module, optimiser, policy, replay, state.iteration + 1)
     return state, {name: float(value) for name, value in metrics.items()}
 
 
-def initial_state(config: MetaConfig, toy: MassDamper, key: PRNGKeyArray, init_from: str | None = None) -> RunState:
+def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: str | None = None) -> RunState:
     """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
     module = InferenceModule(config.inference, 1, module_key)
-    policy = sac.initial_state(len(config.policy_fields) + 2 * config.inference.latent, 1, config.sac, sac_key)
+    observations, families = len(config.policy_fields), len(config.tasks.families)
+    policy = sac.initial_state(observations + 2 * config.inference.latent, 1, config.sac, sac_key)
+    told = sac.initial_state(observations + 2 * 2 * families, 1, config.sac, sac_key)
     if init_from is not None:
-        module, policy = _take_over(init_from, module, policy)
+        parts = load_inference(init_from).parts
+        module = _take_over(parts.module, module, init_from)
+        policy = sac.take_over(policy, parts.high_level.actor, init_from)
+        told = sac.take_over(told, parts.told_policy.actor, init_from)
     one_group = jax.eval_shape(
         lambda: collect(module.encoder, policy.actor, toy, config, roles(config.episodes, True), key)
     )
@@ -100,21 +108,31 @@ def initial_state(config: MetaConfig, toy: MassDamper, key: PRNGKeyArray, init_f
         module=module,
         optimiser=_optimiser(config).init(eqx.filter(module, eqx.is_array)),
         sac=policy,
+        told=told,
         replay=jax.tree.map(lambda leaf: jnp.zeros((config.groups, *leaf.shape), leaf.dtype), one_group),
         iteration=jnp.zeros((), jnp.int32),
     )
 
 
-def _take_over(reference: str, module: InferenceModule, policy: SACState) -> tuple[InferenceModule, SACState]:
-    parts = load_inference(reference).parts
-    actor = parts.high_level.actor
-    if jax.tree.map(jnp.shape, (parts.module, actor)) != jax.tree.map(jnp.shape, (module, policy.actor)):
-        raise RebodyError(f"cannot start from '{reference}': its networks have other sizes than these settings.")
-    return parts.module, eqx.tree_at(lambda p: (p.actor, p.averaged_actor), policy, (actor, actor))
+def _take_over(trained: InferenceModule, fresh: InferenceModule, name: str) -> InferenceModule:
+    if jax.tree.map(jnp.shape, trained) != jax.tree.map(jnp.shape, fresh):
+        raise RebodyError(f"cannot start from '{name}': its networks have other sizes than these settings.")
+    return trained
+
+
+def trained_parts(state: RunState, config: MetaConfig) -> InferenceParts:
+    """What is kept of a run, its probe not yet fitted."""
+    by_belief, by_task = (
+        HighLevelPolicy(policy.averaged_actor, config.policy_fields, config.policy_scales)
+        for policy in (state.sac, state.told)
+    )
+    unfitted = jnp.zeros((config.inference.latent + 1, len(config.tasks.families)))
+    probe = Probe(jnp.asarray(config.tasks.families), unfitted, unfitted)
+    return InferenceParts(state.module, by_belief, by_task, probe)
 
 
 @eqx.filter_jit
-def store(replay: Episodes, episodes: Episodes, iteration: Int[Array, ""] | int):
+def store(replay: Episodes, episodes: Episodes, iteration: Int[Array, ""]):
     """The ring with a group more in place of its oldest, and how many groups it holds."""
     groups = replay.reward.shape[0]
     replay = jax.tree.map(lambda ring, new: ring.at[iteration % groups].set(new), replay, episodes)
@@ -147,18 +165,19 @@ def update_inference(
 @eqx.filter_jit
 def update_policy(
     policy: SACState, replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray
-) -> tuple[SACState, dict[str, Float[Array, ""]]]:
+) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """Steps of soft actor-critic on nominal episodes, with the beliefs held then."""
-    arrays, static = eqx.partition(policy, eqx.is_array)
 
-    def step(arrays, key):
-        sample_key, update_key = jax.random.split(key)
-        batch = sample_transitions(replay, stored, config, sample_key)
-        updated, metrics = sac.update(eqx.combine(arrays, static), batch, update_key, config.sac)
-        return eqx.filter(updated, eqx.is_array), metrics
+    def batch_of(_: None, key: PRNGKeyArray) -> SACBatch:
+        return sample_transitions(replay, stored, config, key)
 
-    arrays, metrics = jax.lax.scan(step, arrays, jax.random.split(key, config.policy_updates))
-    return eqx.combine(arrays, static), jax.tree.map(jnp.mean, metrics)
+    return sac.update_many(policy, batch_of, None, jax.random.split(key, config.policy_updates), config.sac)
+
+
+def tell(episodes: Episodes, config: MetaConfig) -> Episodes:
+    """The same episodes with the truth in place of what was believed."""
+    lasting = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf[..., None], episodes.state.x.shape), episodes.task)
+    return eqx.tree_at(lambda e: e.belief, episodes, task_code(config.target_ranges)(lasting))
 
 
 def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray) -> Evidence:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.control.tracker import SLOTS, Tracker
@@ -57,7 +58,7 @@ def _run(
     fell = np.zeros(len(slot), bool)
     for _ in range(round(SECONDS / 0.1)):
         for _ in range(spec.steps_per_decision):
-            follow(tracker, batch, subgoal)
+            follow(TrackerController(tracker), batch, subgoal)
             fell |= batch.fallen
         positions.append(batch.x.copy())
     return np.array(positions), fell
@@ -100,4 +101,5 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
         config=stored,
         weights=tracker,
         card=card(f"Tracker: {spec.name}", what, run, seed, rows),
+        log=run.log,
     )

@@ -11,15 +11,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int, PRNGKeyArray
+from jaxtyping import Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import load_tracker
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.tracker import Command, Tracker, tracker_observation, tracker_reward
-from rebody.errors import RebodyError
 from rebody.tasks import GOAL
+from rebody.training.ring import draw, write
 from rebody.training.run import Metrics, Run
 from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.orders import Orders, commands, follow_guides, no_orders, renew
@@ -82,7 +82,8 @@ def iterate(state: RunState, batch: RobotBatch, config: TrackerConfig, seed: int
     rng = np.random.default_rng((seed, 2, iteration))
     collect_key, learn_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration))
     collect(state, batch, config, rng, collect_key)
-    transitions = draw(state.replay, iteration + 1, config, rng)
+    written = (iteration + 1) * config.steps * config.robots
+    transitions = draw(state.replay, written, (config.updates, config.sac.batch_size), rng)
     policy, metrics = learn(state.sac, transitions, learn_key, config, batch.spec.control_dt)
     state = eqx.tree_at(
         lambda s: (s.sac, s.physics, s.lying_s, s.iteration),
@@ -110,7 +111,6 @@ def collect(
         joints, x, command = spec.joint_state(batch.qpos, batch.qvel), batch.x, commands(orders, batch.x)
         action = np.asarray(_explore(state.sac.actor, joints, command, action_key, config))
         batch.step(action)
-        rows = (first_row + step * config.robots + np.arange(config.robots)) % config.replay
         seen = Replay(
             joints=joints,
             action=action,
@@ -120,8 +120,7 @@ def collect(
             slot=command.slot,
             value=command.value,
         )
-        for ring, new in zip(jax.tree.leaves(state.replay), jax.tree.leaves(seen), strict=True):
-            ring[rows] = new
+        write(state.replay, first_row + step * config.robots, seen)
         reset_the_fallen(state, batch, rng)
 
 
@@ -133,30 +132,16 @@ def reset_the_fallen(state: RunState, batch: RobotBatch, rng: np.random.Generato
     state.previous_qpos[fallen] = batch.qpos[fallen]
 
 
-def draw(replay: Replay, iterations: int, config: TrackerConfig, rng: np.random.Generator) -> Replay:
-    """A batch for each update of an iteration, [update, batch]."""
-    stored = min(config.replay, iterations * config.steps * config.robots)
-    rows = rng.integers(stored, size=(config.updates, config.sac.batch_size))
-    return jax.tree.map(lambda ring: ring[rows], replay)
-
-
 @eqx.filter_jit
 def learn(
     policy: SACState, transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float
-) -> tuple[SACState, dict[str, Float[Array, ""]]]:
+) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """One update of soft actor-critic per batch."""
-    arrays, static = eqx.partition(policy, eqx.is_array)
 
-    def step(arrays, inputs):
-        transitions, key = inputs
-        command_key, update_key = jax.random.split(key)
-        batch = relabel(transitions, command_key, config, control_dt)
-        updated, metrics = sac.update(eqx.combine(arrays, static), batch, update_key, config.sac)
-        return eqx.filter(updated, eqx.is_array), metrics
+    def batch_of(transitions: Replay, key: PRNGKeyArray) -> SACBatch:
+        return relabel(transitions, key, config, control_dt)
 
-    keys = jax.random.split(key, config.updates)
-    arrays, metrics = jax.lax.scan(step, arrays, (transitions, keys))
-    return eqx.combine(arrays, static), jax.tree.map(jnp.mean, metrics)
+    return sac.update_many(policy, batch_of, transitions, jax.random.split(key, config.updates), config.sac)
 
 
 def relabel(transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float) -> SACBatch:
@@ -197,7 +182,7 @@ def initial_state(
     joints = spec.joint_state(batch.qpos, batch.qvel)
     policy = sac.initial_state(observation_size(joints), spec.model.nu, config.sac, key)
     if init_from is not None:
-        policy = _take_over(init_from, policy)
+        policy = sac.take_over(policy, load_tracker(init_from).tracker.actor, init_from)
     return RunState(
         sac=policy,
         replay=Replay(
@@ -221,13 +206,6 @@ def observation_size(joints: Float[np.ndarray, "robot joint"]) -> int:
     """Features that a tracker's policy sees."""
     still = Command(np.zeros(len(joints), np.int32), np.zeros(len(joints), np.float32))
     return tracker_observation(joints, still, 1.0, 1.0).shape[-1]
-
-
-def _take_over(reference: str, policy: SACState) -> SACState:
-    actor = load_tracker(reference).tracker.actor
-    if jax.tree.map(jnp.shape, actor) != jax.tree.map(jnp.shape, policy.actor):
-        raise RebodyError(f"cannot start from '{reference}': its networks have other sizes than these settings.")
-    return eqx.tree_at(lambda p: (p.actor, p.averaged_actor), policy, (actor, actor))
 
 
 def _tracker(state: RunState, config: TrackerConfig) -> Tracker:

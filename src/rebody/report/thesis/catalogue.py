@@ -1,0 +1,135 @@
+"""Every figure by its number: where its log comes from, how it is drawn, and what is seen."""
+
+import difflib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rebody.errors import RebodyError
+from rebody.report.thesis import first_experiment as first
+from rebody.report.thesis.data import Data, save
+
+
+@dataclass(frozen=True)
+class ThesisFigure:
+    """One figure of the thesis."""
+
+    number: str
+    title: str
+    shipped: Callable[[], Data]
+    """Its log out of the package."""
+    rerun: Callable[[Path], Data]
+    """Its log anew; training runs go into that folder, and are gone on with if they are there."""
+    draw: Callable[[Data, Path, str], None]
+    """Draws a log into a PNG with a caption."""
+    caption: str
+    """What is seen."""
+
+
+FIGURES = {
+    figure.number: figure
+    for figure in (
+        ThesisFigure(
+            "6.1",
+            "the toy in MuJoCo, and the forces on it",
+            first.shipped("6.1"),
+            first.toy_picture,
+            first.draw_toy,
+            "Left: the mass-damper toy as MuJoCo draws it. Right: what acts on it. The action is the share of the "
+            "largest force; gravity is carried by the floor; terminal speed 3.5 m/s.",
+        ),
+        ThesisFigure(
+            "6.2",
+            "return during training on the toy",
+            first.toy_training_log,
+            first.train_toy,
+            first.draw_toy_training,
+            "Return over 20 s while `position-thesis` learns: of episodes that act by their mean action, and of 200 "
+            "held-out goals; the oracle is the same learner, told the goal. Until the first joint iteration all toys "
+            "wander, and only the inference module learns.",
+        ),
+        ThesisFigure(
+            "6.3",
+            "the trained module on the toy",
+            first.shipped("6.3"),
+            lambda _: first.on_toy(),
+            first.draw_episodes,
+            "12 hidden goals in [0, 10] m on the position toy (steps of at most 0.1 m). Left: the way (dots: goals) "
+            "and the one-dimensional latent. Right: the latent over the goal, every decision of the second half.",
+        ),
+        ThesisFigure(
+            "6.5",
+            "a flat policy on the cheetah: trajectories",
+            first.shipped("6.5"),
+            lambda _: first.flat_on_cheetah(),
+            first.draw_episodes,
+            "The frozen module `position` on the cheetah with a policy that has no hierarchy in it (`flat-cheetah`): "
+            "12 hidden goals in +-10 m.",
+        ),
+        ThesisFigure(
+            "6.6",
+            "a flat policy on the cheetah: training",
+            first.flat_training_log,
+            first.train_flat_again,
+            first.draw_flat_training,
+            "Learning `flat-cheetah`. Left: the task's reward per decision while it explores. Right: final error on "
+            "100 held-out goals in +-10 m.",
+        ),
+        ThesisFigure(
+            "6.7",
+            "the cheetah's tracker: training",
+            first.tracker_training_log,
+            first.train_tracker_again,
+            first.draw_tracker_training,
+            "Learning `tracker-cheetah`: errors on 100 held-out goals within 5 m (left) and 100 held-out speeds of "
+            "+-[1, 3] m/s (right), told to the tracker, at every 50th iteration.",
+        ),
+        ThesisFigure(
+            "6.8",
+            "the naive transfer to the cheetah: a decision at every control step",
+            first.shipped("6.8"),
+            lambda _: first.thesis_on_cheetah(1),
+            first.draw_transfer,
+            "`position-thesis`, frozen, on the cheetah in thesis mode with stride 1: 12 hidden goals in [0, 10] m.",
+        ),
+        ThesisFigure(
+            "6.9",
+            "striding on the cheetah",
+            first.shipped("6.9"),
+            lambda _: first.strides_on_cheetah(),
+            first.draw_strides,
+            "The same with strides of 10, 50 and 100 control steps (0.5, 2.5 and 5 s), and beside them our mode: "
+            "`position`, a decision every 0.1 s, the toy imagined 15 decisions ahead.",
+        ),
+    )
+}
+
+
+def find_figures(numbers: Sequence[str]) -> list[ThesisFigure]:
+    """Figures by number, or `all`; RebodyError for one that there is not."""
+    if "all" in numbers:
+        return list(FIGURES.values())
+    for number in numbers:
+        if number not in FIGURES:
+            near = difflib.get_close_matches(number, FIGURES, n=1)
+            hint = f" Did you mean {near[0]}?" if near else ""
+            raise RebodyError(f"there is no figure '{number}'.{hint} Figures are: {', '.join(FIGURES)}, or all.")
+    return [FIGURES[number] for number in dict.fromkeys(numbers)]
+
+
+def make_figure(figure: ThesisFigure, out: Path, *, rerun: bool) -> Path:
+    """Draw a figure into the folder `out`, with its caption; returns the PNG's path.
+
+    With `rerun` its log is made anew and written beside it.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / f"{figure.number}.png"
+    if rerun:
+        data = figure.rerun(out / "runs")
+        save(data, out / f"{figure.number}.safetensors")
+    else:
+        data = figure.shipped()
+    source = "anew" if rerun else "from the log that ships"
+    command = f"rebody figure {figure.number}" + (" --rerun" if rerun else "")
+    figure.draw(data, path, f"{figure.caption}\nThesis, figure {figure.number}. Made by `{command}` ({source}).")
+    return path

@@ -1,0 +1,74 @@
+"""What figures are drawn from: named arrays, out of training logs and of episodes."""
+
+import csv
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import safetensors.numpy
+
+from rebody.evaluation.evaluate import Trial, run_trial, trial_agent
+from rebody.store import load_artifact
+from rebody.tasks.task_file import TaskSpec, active_tasks
+from rebody.types import DECISION_DT
+
+Data = dict[str, np.ndarray]
+
+LOGS = Path(__file__).parent / "logs"
+POINTS = 400
+"""Points of a trajectory that are kept, at most."""
+
+
+def shipped(number: str) -> Callable[[], Data]:
+    """The log of a figure that lies in the package."""
+    return lambda: safetensors.numpy.load_file(LOGS / f"{number}.safetensors")
+
+
+def save(data: Data, path: Path) -> None:
+    """Write a log."""
+    safetensors.numpy.save_file({name: np.ascontiguousarray(array) for name, array in data.items()}, path)
+
+
+def training_log(artifact: str | Path, kind: str) -> Data:
+    """What the training of an artifact measured: an array per column, NaN where it measured nothing.
+
+    `steps` counts steps of the toy or control steps of the robots.
+    """
+    loaded = load_artifact(artifact, kind)
+    rows = list(csv.DictReader(io.StringIO(loaded.log)))
+    data = {name: np.array([float(row[name] or "nan") for row in rows], np.float32) for name in rows[0]}
+    settings = loaded.config["training"]
+    per_iteration = (
+        settings["episodes"] * settings["decisions"] if kind == "inference" else settings["robots"] * settings["steps"]
+    )
+    return data | {"steps": data["iteration"] * per_iteration}
+
+
+def trajectories(trial: Trial, targets: np.ndarray) -> Data:
+    """Episodes on hidden goals: time_s [time], position_m [time, episode], latent [time, episode, latent], target.
+
+    `decision_s` is the time from one decision to the next.
+    """
+    tasks = active_tasks([TaskSpec("goal", float(target)) for target in targets], trial.decisions, DECISION_DT)
+    episodes = run_trial(trial, trial_agent(trial, tasks), tasks, np.zeros(len(targets), int))
+    every = -(-trial.decisions // POINTS)
+    kept = np.arange(every - 1, trial.decisions, every)
+    decision_s = trial.stride * trial.robot.control_dt if trial.robot and trial.thesis else DECISION_DT
+    return {
+        "time_s": DECISION_DT * (kept + 1.0),
+        "position_m": np.asarray(episodes.state.x)[kept],
+        "latent": np.asarray(episodes.belief.mean)[kept],
+        "target": np.asarray(targets, float),
+        "decision_s": np.array(decision_s),
+    }
+
+
+def join(parts: dict[str, Data]) -> Data:
+    """Several logs as one."""
+    return {f"{part}/{name}": array for part, data in parts.items() for name, array in data.items()}
+
+
+def split(data: Data, part: str) -> Data:
+    """One log of several."""
+    return {name.removeprefix(f"{part}/"): array for name, array in data.items() if name.startswith(f"{part}/")}

@@ -1,0 +1,245 @@
+"""Training a flat policy with soft actor-critic: the frozen module believes, the policy moves the joints.
+
+It is paid as a tracker would be that was told the hidden task; all it hears of the task itself is what
+the module makes of the rewards (thesis 6.3.2).
+"""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int, PRNGKeyArray
+
+from rebody.agents.build import check_fit
+from rebody.agents.parts import Inference, load_flat, load_inference
+from rebody.bodies import RobotBatch, load_robot
+from rebody.control import sac
+from rebody.control.flat import FlatPolicy, flat_observation
+from rebody.control.sac import Actor, SACBatch, SACState
+from rebody.control.tracker import Command, tracker_reward
+from rebody.inference import Encoder, EncoderCarry
+from rebody.tasks import GOAL, BaseTask, RewardForm, TaskDistribution, reward
+from rebody.training.flat.config import FlatConfig
+from rebody.training.flat.report import measure, save_flat
+from rebody.training.ring import draw, write
+from rebody.training.run import Metrics, Run
+from rebody.types import AnyArray, Belief, GlobalState, Task, Transition
+
+EVALUATE_EVERY = 50
+
+
+class Minds(eqx.Module):
+    """What each robot's frozen module remembers and believes, and the task that is hidden from it."""
+
+    encoder: EncoderCarry
+    belief: Belief
+    state: GlobalState  # at the last decision
+    task: Task
+
+
+class Replay(eqx.Module):
+    """Transitions of control steps: a ring in host memory, written in place, or batches drawn from it."""
+
+    observation: Float[AnyArray, "*size feature"]
+    action: Float[AnyArray, "*size action"]
+    reward: Float[AnyArray, "*size"]
+    next_observation: Float[AnyArray, "*size feature"]
+
+
+class RunState(eqx.Module):
+    """Everything that a resumed run needs; host arrays are written in place."""
+
+    sac: SACState
+    replay: Replay
+    minds: Minds
+    physics: Float[np.ndarray, "robot state"]
+    previous_qpos: Float[np.ndarray, "robot nq"]  # at the last decision
+    lying_s: Float[np.ndarray, " robot"]
+    iteration: Int[np.ndarray, ""]
+
+
+def train_flat(
+    robot: str,
+    inference: str,
+    config: FlatConfig,
+    out: Path,
+    seed: int,
+    *,
+    resume: bool = False,
+    init_from: str | None = None,
+) -> Path:
+    """Train a flat policy; returns the artifact's folder.
+
+    RebodyError if `out` holds another run, or module and robot do not fit; Interrupted on Ctrl-C.
+    """
+    spec, module = load_robot(robot), load_inference(inference)
+    check_fit(module, spec.name, spec.moving_fields)
+    settings = {"robot": robot, "inference": inference, "seed": seed, "init_from": init_from}
+    run = Run(out, asdict(config) | settings, resume=resume)
+    batch = RobotBatch(spec, config.robots)
+    batch.reset(np.random.default_rng((seed, 1)))
+    state = run.restore(initial_state(config, batch, module, jax.random.key(seed), init_from))
+    batch.state, batch.lying_s[:] = state.physics, state.lying_s
+    state = run.loop(state, lambda state: iterate(state, batch, module, config, seed), config.iterations, "flat")
+    return save_flat(flat_policy(state, module), module, spec, config, run, seed)
+
+
+def iterate(
+    state: RunState, batch: RobotBatch, module: Inference, config: FlatConfig, seed: int
+) -> tuple[RunState, Metrics]:
+    """Move the robots, learn from the replay, now and then evaluate."""
+    iteration = int(state.iteration)
+    rng = np.random.default_rng((seed, 2, iteration))
+    collect_key, learn_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration))
+    minds, earned = collect(state, batch, module, config, rng, collect_key)
+    stored = (iteration + 1) * config.steps * config.robots
+    transitions = draw(state.replay, stored, (config.updates, config.sac.batch_size), rng)
+    policy, metrics = learn(state.sac, transitions, learn_key, config)
+    state = eqx.tree_at(
+        lambda s: (s.sac, s.minds, s.physics, s.lying_s, s.iteration),
+        state,
+        (policy, minds, batch.state, batch.lying_s.copy(), state.iteration + 1),
+    )
+    metrics |= {"task_reward": earned}
+    if (iteration + 1) % EVALUATE_EVERY == 0:
+        figures = measure(flat_policy(state, module), module, batch.spec)
+        metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
+    return state, {name: float(value) for name, value in metrics.items()}
+
+
+def collect(
+    state: RunState,
+    batch: RobotBatch,
+    module: Inference,
+    config: FlatConfig,
+    rng: np.random.Generator,
+    key: PRNGKeyArray,
+) -> tuple[Minds, float]:
+    """Move every robot by `config.steps` control steps; write the replay in place.
+
+    Returns the minds afterwards, and the mean reward that the task gave per decision.
+    """
+    spec, minds, rewards = batch.spec, state.minds, []
+    first = int(state.iteration) * config.steps
+    for step in range(first, first + config.steps):
+        task_key, action_key = jax.random.split(jax.random.fold_in(key, step - first))
+        if step % (config.decisions * spec.steps_per_decision) == 0:
+            batch.reset(rng)
+            minds = new_minds(batch, module, task_key)
+            state.previous_qpos[:] = batch.qpos
+        observation, x = observe(batch, minds.belief, module), batch.x
+        action = np.asarray(_explore(state.sac.actor, observation, action_key))
+        batch.step(action)
+        if (step + 1) % spec.steps_per_decision == 0:
+            now = spec.observe(batch.qpos, state.previous_qpos)
+            minds, earned = listen(module.parts.module.encoder, minds, now, module.contract.reward)
+            state.previous_qpos[:] = batch.qpos
+            rewards.append(np.mean(earned))
+        seen = Replay(
+            observation=observation,
+            action=action,
+            reward=_pay(batch, x, minds.task, action, config),
+            next_observation=observe(batch, minds.belief, module),
+        )
+        write(state.replay, step * config.robots, seen)
+        put_on_feet(batch, rng)
+    return minds, float(np.mean(rewards))
+
+
+def observe(batch: RobotBatch, belief: Belief, module: Inference) -> Float[np.ndarray, "robot feature"]:
+    """What the flat policy sees of each robot."""
+    joints = batch.spec.joint_state(batch.qpos, batch.qvel)
+    return np.asarray(flat_observation(joints, batch.x.astype(np.float32), belief, reach(module)))
+
+
+def put_on_feet(batch: RobotBatch, rng: np.random.Generator) -> None:
+    """A robot that has fallen is put on its feet where it lies: episode and belief go on."""
+    fallen, x = batch.fallen, batch.x
+    batch.reset(rng, fallen)
+    batch.qpos[fallen, batch.spec.root_addresses[0]] = x[fallen]
+
+
+def new_minds(batch: RobotBatch, module: Inference, key: PRNGKeyArray) -> Minds:
+    """Fresh hidden tasks, and nothing known about them."""
+    encoder, shape = module.parts.module.encoder, (batch.size,)
+    base_tasks = [BaseTask(name, low, high) for name, (low, high) in module.contract.target_ranges.items()]
+    task = TaskDistribution(tuple(base_tasks)).sample(key, shape)
+    return Minds(encoder.initial(shape), encoder.prior(shape), batch.spec.observe(batch.qpos, batch.qpos), task)
+
+
+@eqx.filter_jit
+def listen(
+    encoder: Encoder, minds: Minds, now: GlobalState, form: RewardForm
+) -> tuple[Minds, Float[AnyArray, " robot"]]:
+    """Every robot's module takes in the decision that ended now."""
+    earned = reward(minds.task, now, form)
+    carry, belief = encoder.step(minds.encoder, Transition(minds.state, earned, now))
+    return Minds(carry, belief, now, minds.task), earned
+
+
+@eqx.filter_jit
+def learn(
+    policy: SACState, transitions: Replay, key: PRNGKeyArray, config: FlatConfig
+) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
+    """One update of soft actor-critic per batch."""
+
+    def batch_of(seen: Replay, _: PRNGKeyArray) -> SACBatch:
+        alive = jnp.zeros_like(seen.reward)
+        return SACBatch(seen.observation, seen.action, seen.reward, seen.next_observation, alive)
+
+    return sac.update_many(policy, batch_of, transitions, jax.random.split(key, config.updates), config.sac)
+
+
+def initial_state(
+    config: FlatConfig, batch: RobotBatch, module: Inference, key: PRNGKeyArray, init_from: str | None = None
+) -> RunState:
+    """Robots that know nothing, an empty replay, a fresh policy or that of an artifact."""
+    minds = new_minds(batch, module, key)
+    features = observe(batch, minds.belief, module).shape[-1]
+    actions, rows = batch.spec.model.nu, config.replay
+    policy = sac.initial_state(features, actions, config.sac, key)
+    if init_from is not None:
+        policy = sac.take_over(policy, load_flat(init_from).policy.actor, init_from)
+    return RunState(
+        sac=policy,
+        replay=Replay(
+            observation=np.zeros((rows, features), np.float32),
+            action=np.zeros((rows, actions), np.float32),
+            reward=np.zeros(rows, np.float32),
+            next_observation=np.zeros((rows, features), np.float32),
+        ),
+        minds=minds,
+        physics=batch.state,
+        previous_qpos=batch.qpos.copy(),
+        lying_s=np.zeros(config.robots),
+        iteration=np.zeros((), np.int64),
+    )
+
+
+def reach(module: Inference) -> float:
+    """How far the module's tasks take a robot, in the unit of their targets."""
+    return max(abs(end) for ends in module.contract.target_ranges.values() for end in ends)
+
+
+def flat_policy(state: RunState, module: Inference) -> FlatPolicy:
+    """The averaged actor."""
+    return FlatPolicy(state.sac.averaged_actor, reach(module))
+
+
+def _pay(
+    batch: RobotBatch, x: Float[np.ndarray, " robot"], task: Task, action: Float[np.ndarray, "robot action"], config
+) -> Float[np.ndarray, " robot"]:
+    """What a tracker would be paid that was told the hidden task."""
+    family, target = np.asarray(task.family), np.asarray(task.target)
+    command = Command(family, (target - np.where(family == GOAL, x, 0.0)).astype(np.float32))
+    moved, spec = (batch.x - x).astype(np.float32), batch.spec
+    pitch = spec.pitch(batch.qpos).astype(np.float32)
+    return np.asarray(tracker_reward(command, moved, spec.control_dt, pitch, action, config.reward))
+
+
+@eqx.filter_jit
+def _explore(actor: Actor, observation, key: PRNGKeyArray) -> Float[AnyArray, "robot action"]:
+    return actor.sample(observation, key)[0]
