@@ -1,6 +1,11 @@
-"""Before `rebody` is imported: JAX on the CPU with its compilation cache on, shapes and types checked."""
+"""Before `rebody` is imported: JAX on the CPU with its compilation cache on, shapes and types checked.
+
+Then what many tests share: tiny parts, most of them untrained, and command lines of tiny training runs.
+"""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "rebody" / "jax-tests"
@@ -11,3 +16,151 @@ os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
 from jaxtyping import install_import_hook  # noqa: E402
 
 install_import_hook("rebody", "beartype.beartype")
+
+import equinox as eqx  # noqa: E402
+import jax  # noqa: E402
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
+
+from rebody.agents.parts import Inference, LoadedFlat, LoadedTracker, inference_template  # noqa: E402
+from rebody.bodies import load_robot  # noqa: E402
+from rebody.bodies.toys import MassDamper  # noqa: E402
+from rebody.cli.main import run  # noqa: E402
+from rebody.control.flat import FlatPolicy  # noqa: E402
+from rebody.control.sac import Actor, SACConfig  # noqa: E402
+from rebody.control.tracker import Tracker  # noqa: E402
+from rebody.evaluation.evaluate import Trial  # noqa: E402
+from rebody.inference.contract import Contract  # noqa: E402
+from rebody.inference.probe import Probe  # noqa: E402
+from rebody.store import tree_hash  # noqa: E402
+from rebody.training.flat import report as flat_report  # noqa: E402
+from rebody.training.inference import report as inference_report  # noqa: E402
+from rebody.training.tracker import report as tracker_report  # noqa: E402
+
+WINDOW, SECONDS = 6, 3.0
+JOINTS, ACTIONS = 17, 6  # of a cheetah
+
+# parts that nothing was learned for: enough to tell whether they are put together rightly
+
+
+@pytest.fixture(scope="session")
+def stored_config():
+    """What an inference artifact's config.json says of its parts."""
+    return {
+        "contract": Contract(("x",), WINDOW, {"goal": (-10.0, 10.0)}, "plain").to_config(),
+        "inference": {"units": 8, "window": WINDOW, "latent": 2},
+        "high_level": {"fields": ["x", "vx"], "scales": [10.0, 3.5], "hidden": [8], "projections": 0},
+        "toy": {"kind": "mass-damper", "mass": 1.0, "damping": 2.0, "max_force": 7.0},
+    }
+
+
+@pytest.fixture(scope="session")
+def inference(stored_config):
+    parts = eqx.filter_jit(lambda: inference_template(stored_config))()
+    weights = [parts.high_level.actor.net.mlp.weights[-1], parts.told_policy.actor.net.mlp.weights[-1]]
+    probe = Probe(np.zeros(1, np.int32), np.zeros((3, 1), np.float32), np.array([[2.0], [-1.0], [0.5]], np.float32))
+    parts = eqx.tree_at(
+        lambda p: (p.high_level.actor.net.mlp.weights[-1], p.told_policy.actor.net.mlp.weights[-1], p.probe),
+        parts,
+        (*(30 * w for w in weights), probe),  # fresh policies hardly act; these do
+    )
+    return Inference("tiny", Contract.from_config(stored_config["contract"]), parts, MassDamper())
+
+
+@pytest.fixture(scope="session")
+def cheetah():
+    return load_robot("cheetah")
+
+
+def lively_actor(observations: int, seed: int) -> Actor:
+    actor = eqx.filter_jit(Actor)(observations, ACTIONS, SACConfig(hidden=(8,)), jax.random.key(seed))
+    return eqx.tree_at(lambda a: a.net.mlp.weights[-1], actor, replace_fn=lambda w: 10 * w)
+
+
+@pytest.fixture(scope="session")
+def tracker():
+    return Tracker(lively_actor(JOINTS + 6, 1), 5.0, 3.0)
+
+
+@pytest.fixture(scope="session")
+def flat_policy():
+    return FlatPolicy(lively_actor(JOINTS + 1 + 4, 2), 10.0)
+
+
+@pytest.fixture(scope="session")
+def trial(inference, tracker, flat_policy, cheetah):
+    """`reuse` on the cheetah; the flat policy is at hand."""
+    return Trial(
+        agent="reuse",
+        inference=inference,
+        robot=cheetah,
+        tracker=LoadedTracker("tiny-tracker", "cheetah", tracker),
+        flat=LoadedFlat("tiny-flat", "cheetah", tree_hash(inference.parts.module), flat_policy),
+        seconds=SECONDS,
+        horizon=5,
+    )
+
+
+# artifacts that learned next to nothing, made by the command line itself
+
+FLAGS = {
+    "tracker": """
+        train tracker --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60
+        --sac.hidden 8 8 --sac.batch-size 8
+    """,
+    "inference": """
+        train inference --episodes 8 --decisions 24 --groups 2
+        --wander-iterations 1 --joint-iterations 2 --policy-iterations 6 --inference-updates 2 --policy-updates 2
+        --inference.units 8 --inference.window 4 --inference.batch-size 4 --inference.decoded 2
+        --sac.hidden 8 8 --sac.projections 2 --sac.batch-size 8
+    """,
+    "flat": """
+        train flat --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5
+        --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
+    """,
+}
+
+
+@contextmanager
+def in_short() -> Iterator[pytest.MonkeyPatch]:
+    """While inside, what was trained is measured in short."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(tracker_report, "COMMANDS", 4)
+        patched.setattr(tracker_report, "SECONDS", 3.0)
+        patched.setattr(inference_report, "HELD_OUT", 8)
+        patched.setattr(inference_report, "DECISIONS", 40)
+        patched.setattr(flat_report, "TASKS", 3)
+        patched.setattr(flat_report, "DECISIONS", 30)
+        yield patched
+
+
+@pytest.fixture
+def measured_in_short() -> Iterator[None]:
+    with in_short():
+        yield
+
+
+@pytest.fixture(scope="session")
+def own_module(tmp_path_factory) -> Path:
+    """Folder of an inference module."""
+    folder = tmp_path_factory.mktemp("trained") / "inference"
+    with in_short():
+        assert run([*FLAGS["inference"].split(), "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="session")
+def tiny_training(own_module) -> dict[str, list[str]]:
+    """Command lines of tiny runs without --out, by the kind of artifact that they make."""
+    arguments = {kind: flags.split() for kind, flags in FLAGS.items()}
+    return arguments | {"flat": [*arguments["flat"], "--inference", str(own_module)]}
+
+
+@pytest.fixture(scope="session")
+def trained(own_module, tiny_training) -> dict[str, Path]:
+    """Folders of an inference module, a tracker, and a flat policy that hears that module."""
+    folders = {kind: own_module.with_name(kind) for kind in tiny_training}
+    with in_short():
+        for kind in ("tracker", "flat"):
+            assert run([*tiny_training[kind], "--out", str(folders[kind])]) == 0
+    return folders

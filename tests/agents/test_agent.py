@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.agents.agent import Observation, relative
-from rebody.agents.parts import build_agent
+from rebody.agents.agent import Observation
+from rebody.agents.build import AGENTS, build_agent
+from rebody.agents.controller import relative
 from rebody.agents.rollout import begin, decide
 from rebody.errors import RebodyError
 from rebody.inference.probe import fit_probe
@@ -152,10 +153,9 @@ def test_the_idle_agent_stands_still(inference, heard):
     np.testing.assert_array_equal(commands.subgoal.value, np.zeros((DECISIONS + 1, SIZE)))
 
 
-@pytest.mark.parametrize("kind", ["resue", "oracle"])
-def test_an_agent_that_cannot_be_built(inference, kind):
-    with pytest.raises(RebodyError, match=f"unknown agent '{kind}'.*reuse, oracle, idle"):
-        build_agent(kind, inference)  # an oracle without tasks
+def test_an_agent_that_there_is_not(inference):
+    with pytest.raises(RebodyError, match=f"unknown agent 'resue'. Agents are: {', '.join(AGENTS)}"):
+        build_agent("resue", inference)
 
 
 def test_reuse_of_several_families_is_refused(inference):

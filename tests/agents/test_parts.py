@@ -6,7 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.agents.parts import check_fit, load_inference, load_tracker
+from rebody.agents.build import check_fit
+from rebody.agents.parts import load_flat, load_inference, load_tracker
 from rebody.errors import RebodyError
 from rebody.store import save_artifact, tree_hash
 
@@ -19,7 +20,7 @@ def saved(inference, stored_config, tmp_path):
 
     def save(**changes):
         config = stored_config | {name: stored_config[name] | change for name, change in changes.items()}
-        save_artifact(tmp_path / "module", kind="inference", config=config, weights=inference.parts, card="# Tiny\n")
+        save_artifact(tmp_path / "module", kind="inference", config=config, weights=inference.parts, card="# Tiny\n", log="")
         return str(tmp_path / "module")
 
     return save
@@ -50,7 +51,7 @@ def test_a_loaded_tracker_acts_as_the_saved_one(tracker, tmp_path):
         "robot": "cheetah", "observations": 23, "actions": 6, "hidden": [8], "projections": 0,
         "max_distance": 5.0, "max_speed": 3.0,
     }  # fmt: skip
-    save_artifact(tmp_path / "t", kind="tracker", config=config, weights=tracker, card="# Tiny\n")
+    save_artifact(tmp_path / "t", kind="tracker", config=config, weights=tracker, card="# Tiny\n", log="")
     loaded = load_tracker(str(tmp_path / "t"))
     observation = jax.random.normal(jax.random.key(0), (4, 23))
     np.testing.assert_array_equal(loaded.tracker.actor(observation), tracker.actor(observation))

@@ -10,15 +10,16 @@ import pytest
 
 from rebody.agents import rollout
 from rebody.agents.agent import Observation
+from rebody.agents.build import build_agent
+from rebody.agents.controller import TrackerController
 from rebody.agents.live import LiveAgent
-from rebody.agents.parts import LoadedTracker, build_agent
-from rebody.agents.rollout import begin, decide, rollout_on_robot, rollout_on_toy, track
+from rebody.agents.parts import LoadedTracker
+from rebody.agents.rollout import begin, decide, joint_action, rollout_on_robot, rollout_on_toy
 from rebody.bodies import RobotBatch
-from rebody.control.tracker import Command
 from rebody.errors import RebodyError
 from rebody.store import tree_hash
-from rebody.tasks import GOAL, VELOCITY, reward
-from rebody.types import GlobalState, Subgoal, Task, Transition
+from rebody.tasks import GOAL, reward
+from rebody.types import GlobalState, Task, Transition
 
 WINDOW = 6
 SEEDS = np.array([7, 8, 9])
@@ -40,7 +41,7 @@ def run(agent, tracker, cheetah):
     """A function (targets, seeds, on_frame) -> episodes on the cheetah."""
 
     def run(targets=TARGETS, seeds=SEEDS, on_frame=None, spec=cheetah):
-        return rollout_on_robot(agent, tracker, spec, lasting(*targets), "plain", seeds, on_frame)
+        return rollout_on_robot(agent, TrackerController(tracker), spec, lasting(*targets), "plain", seeds, on_frame)
 
     return run
 
@@ -73,14 +74,15 @@ def transitions(state, earned):
 
 
 def test_the_belief_of_a_decision_includes_its_transition(agent, episodes):
-    along = eqx.filter_jit(agent.encoder.along)(transitions(episodes.state, episodes.reward))
+    along = eqx.filter_jit(agent.inferrer.along)(transitions(episodes.state, episodes.reward))
     np.testing.assert_allclose(episodes.belief.mean.swapaxes(0, 1), along.mean, atol=1e-5)
 
 
 def test_the_subgoal_of_a_decision_is_the_one_held_during_it(agent, cheetah, tracker):
     heard = []
+    tasks, controller = lasting(1.0), TrackerController(tracker)
     episodes = rollout_on_robot(
-        agent, tracker, cheetah, lasting(1.0), "plain", SEEDS[:1], lambda batch, subgoal: heard.append(subgoal.value)
+        agent, controller, cheetah, tasks, "plain", SEEDS[:1], lambda _, subgoal: heard.append(subgoal.value)
     )
     assert len(heard) == WINDOW * cheetah.steps_per_decision
     np.testing.assert_array_equal(np.array(heard)[:, 0], np.repeat(episodes.subgoal.value[:, 0], 2))
@@ -91,23 +93,16 @@ def test_a_goal_is_made_relative_anew_at_every_control_step(run, monkeypatch):
     """Trap 2: a constant relative goal would be chased for ever."""
     x_before, told = [0.0], []
 
-    def spy(tracker, joints, subgoal, x):
+    def spy(controller, joints, x, subgoal, belief):
         told.append((float(x[0]), float(subgoal.value[0])))
-        return track(tracker, joints, subgoal, x)
+        return joint_action(controller, joints, x, subgoal, belief)
 
-    monkeypatch.setattr(rollout, "track", spy)
+    monkeypatch.setattr(rollout, "joint_action", spy)
     run(on_frame=lambda batch, subgoal: x_before.append(batch.qpos[0, 0]))
     x, subgoal = np.array(told).T
     np.testing.assert_allclose(x, x_before[:-1], atol=1e-6)
     np.testing.assert_array_equal(subgoal[::2], subgoal[1::2])  # two control steps a decision
     assert np.abs(np.diff(x)).min() > 0
-
-
-def test_the_tracker_is_told_the_distance(tracker):
-    joints = np.linspace(-1, 1, 34, dtype=np.float32).reshape(2, 17)
-    subgoal = Subgoal(np.array([GOAL, VELOCITY]), np.array([4.0, 2.0], np.float32))
-    expected = tracker(joints, Command(subgoal.slot, np.array([1.0, 2.0], np.float32)))
-    np.testing.assert_allclose(track(tracker, joints, subgoal, np.full(2, 3.0, np.float32)), expected, atol=1e-6)
 
 
 def test_nothing_that_is_frozen_changes(inference, tracker, run):

@@ -14,11 +14,6 @@ from rebody.errors import RebodyError
 STEPS = 60
 
 
-@pytest.fixture(scope="module")
-def cheetah():
-    return load_robot("cheetah")
-
-
 def batch_of(spec, size, threads=1, seed=0):
     batch = RobotBatch(spec, size, threads)
     batch.reset(np.random.default_rng(seed))

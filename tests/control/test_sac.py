@@ -173,7 +173,7 @@ def test_same_seed_same_result(one_update):
 
 def test_saved_and_loaded_it_acts_the_same(one_update, small_config, tmp_path):
     actor = one_update(0)[0].averaged_actor
-    save_artifact(tmp_path / "a", kind="tracker", config={}, weights=tree_to_arrays(actor), card="# Actor\n")
+    save_artifact(tmp_path / "a", kind="tracker", config={}, weights=tree_to_arrays(actor), card="# Actor\n", log="")
     fresh = initial_state(2, 1, small_config, jax.random.key(5)).actor
     loaded = arrays_into_tree(fresh, load_artifact(tmp_path / "a", "tracker").arrays, "the actor")
     observation = small_batch().observation

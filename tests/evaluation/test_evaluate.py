@@ -69,15 +69,6 @@ def test_the_idle_agent_is_the_same_on_every_task(trial):
     assert first.reward != second.reward
 
 
-def test_point_mass(trial, tmp_path):
-    results = evaluate(replace(trial, robot=None, tracker=None), SPECS, 1)
-    assert (results.robot, results.tracker, results.control_dt) == (POINT_MASS, None, 0.1)
-    assert {episode.oracle_return for episode in results.episodes} == {None}
-    assert results.summary["regret"] is None
-    save_results(results, tmp_path / "toy.json")
-    assert '"oracle_return": null' in (tmp_path / "toy.json").read_text()
-
-
 REFUSED = {
     "was trained on 'cheetah', not on 'hopper'": lambda trial: (
         replace(trial, robot=replace(load_robot("cheetah"), name="hopper")), SPECS,
@@ -89,9 +80,6 @@ REFUSED = {
     "--seconds 2.9 is too short": lambda trial: (replace(trial, seconds=2.9), SPECS),
     "a switch at 3 s is not within an episode of 3 s": lambda trial: (
         trial, [TaskSpec("goal", 1.0, Switch(3.0, "goal", 2.0))],
-    ),
-    "'oracle' drives a tracker, which a point mass does not have": lambda trial: (
-        replace(trial, agent="oracle", robot=None, tracker=None), SPECS,
     ),
     "unknown agent 'resue'": lambda trial: (replace(trial, agent="resue"), SPECS),
     "its encoder sees x, which 'cheetah' does not have": lambda trial: (

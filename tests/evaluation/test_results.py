@@ -17,7 +17,8 @@ from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 from rebody.types import Belief, GlobalState, Subgoal
 
 HEAD = {
-    "version", "robot", "agent", "inference", "decision_dt", "control_dt", "stride", "horizon", "episodes", "summary",
+    "version", "robot", "agent", "inference", "decision_dt", "control_dt", "stride", "horizon", "thesis", "episodes",
+    "summary",
 }  # fmt: skip
 SERIES = {
     "time_s", "position_m", "velocity_m_s", "pitch_rad", "vz_max_m_s", "reward", "active_family", "active_target",
@@ -31,7 +32,7 @@ DECISIONS = 40
 
 @pytest.fixture
 def results(result):
-    return Results("cheetah", "reuse", "tiny", "tiny-tracker", 0.05, 1, 15, [result(), result(target=-1.0)])
+    return Results("cheetah", "reuse", "tiny", "tiny-tracker", 0.05, 1, 15, False, [result(), result(target=-1.0)])
 
 
 def read(path):

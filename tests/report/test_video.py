@@ -1,40 +1,17 @@
 """A film lasts as long as its episode and shows the robot."""
 
-import equinox as eqx
 import imageio_ffmpeg
-import jax
 import numpy as np
 import pytest
 
-from rebody.agents.parts import Inference, LoadedTracker, inference_template
-from rebody.bodies import load_robot
 from rebody.bodies.camera import Camera
-from rebody.bodies.toys import MassDamper
-from rebody.control.sac import Actor, SACConfig
-from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
-from rebody.evaluation.evaluate import Trial, evaluate
-from rebody.inference.contract import Contract
+from rebody.evaluation.evaluate import evaluate
 from rebody.report import film, video
 from rebody.report.video import FRAMES_PER_S, PLOT_HEIGHT, WIDTH
 from rebody.tasks.task_file import TaskSpec
 
 SECONDS = 3.0
-
-
-@pytest.fixture(scope="module")
-def trial():
-    contract = Contract(("x",), 6, {"goal": (-10.0, 10.0)}, "plain")
-    config = {
-        "contract": contract.to_config(),
-        "inference": {"units": 8, "window": 6, "latent": 2},
-        "high_level": {"fields": ["x", "vx"], "scales": [10.0, 3.5], "hidden": [8], "projections": 0},
-    }
-    parts = eqx.filter_jit(lambda: inference_template(config))()
-    tracker = Tracker(eqx.filter_jit(Actor)(17 + 6, 6, SACConfig(hidden=(8,)), jax.random.key(1)), 5.0, 3.0)
-    loaded = LoadedTracker("tiny-tracker", "cheetah", tracker)
-    inference = Inference("tiny", contract, parts, MassDamper())
-    return Trial("reuse", inference, load_robot("cheetah"), loaded, seconds=SECONDS, horizon=5)
 
 
 @pytest.fixture(scope="module")

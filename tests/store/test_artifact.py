@@ -12,12 +12,13 @@ from rebody.errors import RebodyError
 from rebody.store import artifact, load_artifact, save_artifact, shipped_artifacts
 
 CONFIG = {"fields": ["x", "vx"], "window": 16}
-FILES = {"weights.safetensors", "config.json", "card.md", "manifest.json"}
+LOG = "iteration,loss\n1,0.5\n"
+FILES = {"weights.safetensors", "config.json", "card.md", "log.csv", "manifest.json"}
 
 
 def save(path: Path, value: float = 1.0, kind: str = "inference") -> Path:
     weights = {"cell.bias": np.full(3, value, np.float32), "seen": np.array(4), "none": np.zeros((0, 2))}
-    return save_artifact(path, kind=kind, config=CONFIG, weights=weights, card="# A card\n")
+    return save_artifact(path, kind=kind, config=CONFIG, weights=weights, card="# A card\n", log=LOG)
 
 
 def bias(path: Path) -> float:
@@ -39,7 +40,7 @@ def shipped(tmp_path, monkeypatch):
 def test_round_trip(folder):
     loaded = load_artifact(folder, "inference")
     assert (loaded.name, loaded.kind, loaded.path) == ("mine", "inference", folder)
-    assert (loaded.config, loaded.card) == (CONFIG, "# A card\n")
+    assert (loaded.config, loaded.card, loaded.log) == (CONFIG, "# A card\n", LOG)
     assert loaded.arrays["seen"] == 4
     assert loaded.arrays["none"].shape == (0, 2)
     assert {entry.name for entry in folder.iterdir()} == FILES

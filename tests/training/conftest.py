@@ -1,4 +1,4 @@
-"""Tiny runs of both pipelines, in this process and through the command line."""
+"""Tiny runs of every pipeline, in this process and through the command line."""
 
 import sys
 from collections.abc import Callable
@@ -11,22 +11,12 @@ import safetensors.numpy
 
 from rebody.cli.main import run
 from rebody.store import load_artifact, tree_hash
-from rebody.training.inference import report as inference_report
+from rebody.training.flat import train as flat_train
 from rebody.training.inference import train as inference_train
 from rebody.training.run import Run
-from rebody.training.tracker import report as tracker_report
 from rebody.training.tracker import train as tracker_train
 
-TRACKER = """
-    train tracker --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60
-    --sac.hidden 8 8 --sac.batch-size 8
-"""
-INFERENCE = """
-    train inference --episodes 8 --decisions 24 --groups 2
-    --wander-iterations 1 --joint-iterations 2 --policy-iterations 6 --inference-updates 2 --policy-updates 2
-    --inference.units 8 --inference.window 4 --inference.batch-size 4 --inference.decoded 2
-    --sac.hidden 8 8 --sac.projections 2 --sac.batch-size 8
-"""
+KINDS = ("tracker", "inference", "flat")
 
 
 @dataclass(frozen=True)
@@ -58,27 +48,18 @@ def checkpoint(out: Path) -> dict:
     return safetensors.numpy.load_file(out / "checkpoint" / "checkpoint.safetensors")
 
 
-PIPELINES = {
-    "tracker": Pipeline("tracker", TRACKER.split(), tracker_train),
-    "inference": Pipeline("inference", INFERENCE.split(), inference_train),
-}
-
-
 @pytest.fixture(scope="session")
-def pipelines() -> dict[str, Pipeline]:
-    """Both, by name."""
-    return PIPELINES
+def pipelines(tiny_training) -> dict[str, Pipeline]:
+    """All of them, by name."""
+    modules = {"tracker": tracker_train, "inference": inference_train, "flat": flat_train}
+    return {kind: Pipeline(kind, tiny_training[kind], modules[kind]) for kind in KINDS}
 
 
-@pytest.fixture(params=PIPELINES)
-def pipeline(request, monkeypatch) -> Pipeline:
-    """Each of the two, measured in short when it has finished."""
-    monkeypatch.setattr(tracker_report, "COMMANDS", 4)
-    monkeypatch.setattr(tracker_report, "SECONDS", 3.0)
-    monkeypatch.setattr(inference_report, "HELD_OUT", 8)
-    monkeypatch.setattr(inference_report, "DECISIONS", 40)
+@pytest.fixture(params=KINDS)
+def pipeline(request, pipelines, measured_in_short, monkeypatch) -> Pipeline:
+    """Each of them, measured in short when it has finished."""
     monkeypatch.setattr(sys, "argv", ["rebody"])
-    return PIPELINES[request.param]
+    return pipelines[request.param]
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ import time
 from functools import partial
 
 from rebody.cli.main import run
+from rebody.training.flat import train as flat
 from rebody.training.inference import train as inference
 from rebody.training.run import Run
 from rebody.training.tracker import train as tracker
@@ -46,7 +47,7 @@ def die():
 
 
 def live(moment, arguments):
-    tracker.Run = inference.Run = partial(DoomedRun, moment)
+    tracker.Run = inference.Run = flat.Run = partial(DoomedRun, moment)
     os._exit(run([*arguments, "--resume"]))
 
 

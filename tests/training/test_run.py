@@ -133,7 +133,7 @@ def test_networks_of_other_sizes_are_not_resumed(pipeline, tmp_path, capsys):
 
 def untrained(pipeline):
     """What makes a run take no turn at all."""
-    if pipeline.name == "tracker":
+    if pipeline.name != "inference":
         return ["--iterations", 0]
     return ["--wander-iterations", 0, "--joint-iterations", 0, "--policy-iterations", 0]
 
@@ -146,7 +146,7 @@ def test_a_run_can_start_from_the_networks_of_an_artifact(pipeline, tmp_path, mo
     iterate = pipeline.train.iterate
     monkeypatch.setattr(pipeline.train, "iterate", lambda state, *rest: begun.append(state) or iterate(state, *rest))
     assert pipeline(tmp_path / "second", "--seed", 1, "--init-from", tmp_path / "first") == 0
-    actor = "actor." if pipeline.name == "tracker" else "high_level.actor."
+    actor = "high_level.actor." if pipeline.name == "inference" else "actor."
     wanted = {name.removeprefix(actor): array for name, array in first.items() if name.startswith(actor)}
     assert len(begun) == TURNS
     assert tree_hash(begun[0].sac.actor) == tree_hash(begun[0].sac.averaged_actor) == tree_hash(wanted)
@@ -249,7 +249,7 @@ def test_curves_are_written_for_tensorboard(pipeline, tmp_path):
     for step, tag, value in events(tmp_path / "run" / "events"):
         curves.setdefault(tag, {})[step] = value
     assert {"critic_loss", "actor_loss", "temperature", "entropy", "value"} <= curves.keys()
-    begin = 1 if pipeline.name == "tracker" else 2  # while all toys wander, no policy learns
+    begin = 2 if pipeline.name == "inference" else 1  # while all toys wander, no policy learns
     assert list(curves["critic_loss"]) == list(range(begin, TURNS + 1))
     assert all(np.isfinite(list(curve.values())).all() for curve in curves.values())
 

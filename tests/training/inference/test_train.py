@@ -3,16 +3,18 @@
 from dataclasses import replace
 from itertools import pairwise
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from rebody.store import tree_hash
+from rebody.tasks import GOAL
 from rebody.training.inference import train
 from rebody.training.inference.episodes import Episodes
 from rebody.training.inference.train import sample_evidence, sample_transitions, store
-from rebody.types import Belief, GlobalState
+from rebody.types import Belief, GlobalState, Task
 
 
 def number(group, episode, time):
@@ -30,6 +32,7 @@ def labelled(config):
     return jax.tree.map(
         jnp.asarray,
         Episodes(
+            task=Task(np.full(where.shape[:2], GOAL, np.int32), where[..., 0] / 1000),
             state=state,
             belief=Belief(latent + 0.5, (latent + 1.0) ** 2),
             action=where[..., :-1, None],
@@ -112,7 +115,7 @@ def test_scales_divide_what_the_policy_sees(labelled, config):
 def test_arrival_is_paid_on_the_spot_and_half_of_it_at_ten_centimetres(labelled, config):
     paid = replace(config, arrival=0.4)
     for earned, extra in ((0.0, 0.4), (-0.1, 0.2), (-10.0, 0.4 * 0.1 / 10.1)):
-        replay = Episodes(labelled.state, labelled.belief, labelled.action, jnp.full_like(labelled.reward, earned))
+        replay = eqx.tree_at(lambda e: e.reward, labelled, jnp.full_like(labelled.reward, earned))
         batch = sample_transitions(replay, 3, paid, jax.random.key(0))
         np.testing.assert_allclose(batch.reward, earned / 10.0 + extra, rtol=1e-5)
 
@@ -121,7 +124,7 @@ def test_the_newest_episodes_replace_the_oldest(labelled, config):
     replay = jax.tree.map(jnp.zeros_like, labelled)
     for iteration in range(5):
         new = jax.tree.map(lambda leaf, i=iteration: jnp.full_like(leaf[0], i + 1), labelled)
-        replay, stored = store(replay, new, iteration)
+        replay, stored = store(replay, new, jnp.asarray(iteration))
         assert int(stored) == min(iteration + 1, 3)
     for leaf in jax.tree.leaves(replay):
         np.testing.assert_array_equal(leaf.reshape(3, -1).T - np.array([4, 5, 3]), 0)
@@ -140,4 +143,5 @@ def test_inference_is_frozen_while_the_policy_learns_on(pipelines, tmp_path, mon
     assert changed(lambda state: state.module.encoder) == [True, True, True, False, False]
     assert changed(lambda state: state.module.decoder.reference) == [True, True, True, False, False]
     assert changed(lambda state: state.sac.actor) == [False, True, True, True, True]
+    assert changed(lambda state: state.told.actor) == [False, True, True, True, True]
     assert changed(lambda state: state.replay.reward) == 5 * [True]

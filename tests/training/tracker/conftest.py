@@ -3,16 +3,11 @@
 import numpy as np
 import pytest
 
-from rebody.bodies import RobotBatch, load_robot
+from rebody.bodies import RobotBatch
 from rebody.control.sac import SACConfig
 from rebody.training.tracker import TrackerConfig
 
 ROBOTS, STEPS, ROWS = 3, 4, 29  # a ring that is no multiple of the twelve rows of a turn
-
-
-@pytest.fixture(scope="session")
-def cheetah():
-    return load_robot("cheetah")
 
 
 @pytest.fixture

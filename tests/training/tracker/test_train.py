@@ -8,7 +8,7 @@ import pytest
 
 from rebody.tasks import GOAL, VELOCITY
 from rebody.training.tracker import train
-from rebody.training.tracker.train import Replay, collect, draw, initial_state, relabel
+from rebody.training.tracker.train import Replay, collect, initial_state, relabel
 
 CONTROL_DT = 0.05
 TURNS = 4
@@ -87,18 +87,6 @@ def test_what_has_fallen_starts_anew_with_a_new_order(batch, config):
     np.testing.assert_array_equal(state.previous_qpos[1], batch.qpos[1])
     np.testing.assert_array_equal(state.orders.steps_left, [left[0], 0, left[2]])
     assert batch.lying_s[1] == 0
-
-
-def test_batches_are_drawn_from_what_is_stored(batch, config):
-    replay = initial_state(config, batch, jax.random.key(0)).replay
-    replay.value[:] = np.arange(config.replay)
-    replay.joints[:, 0] = np.arange(config.replay)
-    wide = replace(config, updates=200)
-    for iterations, stored in ((1, 12), (2, 24), (3, config.replay), (40, config.replay)):
-        drawn = draw(replay, iterations, wide, np.random.default_rng(0))
-        assert drawn.value.shape == (200, config.sac.batch_size)
-        assert set(drawn.value.ravel()) == set(range(stored))
-        np.testing.assert_array_equal(drawn.joints[..., 0], drawn.value)
 
 
 @pytest.fixture
