@@ -10,12 +10,11 @@ import pytest
 
 from rebody.agents.agent import Observation
 from rebody.agents.build import AGENTS, build_agent
-from rebody.agents.controller import relative
 from rebody.agents.rollout import begin, decide
 from rebody.errors import RebodyError
 from rebody.inference.probe import fit_probe
 from rebody.tasks import GOAL, VELOCITY
-from rebody.types import Belief, GlobalState, Subgoal, Task
+from rebody.types import Belief, GlobalState, Task
 
 SIZE, DECISIONS = 3, 8
 
@@ -86,11 +85,39 @@ def test_one_decision_ahead_lies_within_the_toys_reach(inference):
     assert np.abs(value - STATE.x).max() <= 0.07 + 1e-6  # 0.1 s * 0.1 s * 7 N / 1 kg
 
 
-def test_a_goal_is_a_point_in_the_world_and_a_speed_is_not():
-    """Trap 2: the distance to a goal shrinks as the robot moves."""
-    subgoal = Subgoal(np.array([GOAL, VELOCITY]), np.array([4.0, 1.5]))
-    seen = [np.asarray(relative(subgoal, np.full(2, x))) for x in (0.0, 3.0, 4.0, 5.5)]
-    np.testing.assert_allclose(seen, [[4.0, 1.5], [1.0, 1.5], [0.0, 1.5], [-1.5, 1.5]], atol=1e-6)
+def test_readout_hands_on_what_is_read_and_acts_as_one_who_is_told_it(inference):
+    command = say(build_agent("readout", inference), STATE, BELIEF, FIRST)
+    family, target = inference.parts.probe(BELIEF)
+    assert np.ptp(target) > 1.0
+    assert_told(command, inference, family, target)
+
+
+def test_bayes_hands_on_the_mode_and_acts_as_one_who_is_told_it(inference):
+    modes = np.array([[GOAL, 3.0], [GOAL, -2.5], [GOAL, 0.0]], np.float32)
+    command = say(build_agent("bayes", inference), STATE, Belief(modes, 0 * modes), FIRST)
+    assert_told(command, inference, np.full(SIZE, GOAL), modes[:, 1])
+
+
+def assert_told(command, inference, family, target):
+    np.testing.assert_array_equal(command.subgoal.slot, family)
+    np.testing.assert_array_equal(command.subgoal.value, target)
+    told = np.stack([np.ones(SIZE), np.asarray(target) / 10.0], axis=-1).astype(np.float32)
+    acts = inference.parts.told_policy(STATE, Belief(told, 0 * told))
+    np.testing.assert_allclose(command.action, acts, rtol=1e-5)
+    assert np.ptp(acts) > 0.05
+
+
+def test_reuse_is_no_readout(inference):
+    """Trap 1: the same module, the same belief, another subgoal."""
+    reused, read = (say(build_agent(kind, inference), STATE, BELIEF, FIRST) for kind in ("reuse", "readout"))
+    assert np.abs(reused.subgoal.value - read.subgoal.value).min() > 0.1
+    assert np.abs(reused.action - read.action).min() > 0.01
+
+
+def test_a_flat_agent_says_nothing(inference):
+    command = say(build_agent("flat", inference), STATE, BELIEF, FIRST)
+    assert np.isnan(command.subgoal.value).all()
+    assert np.isnan(command.action).all()
 
 
 @pytest.fixture(scope="module")
@@ -145,6 +172,24 @@ def test_the_oracle_says_the_active_target(inference, heard):
     np.testing.assert_array_equal(commands.subgoal.value[:DECISIONS], target)
     reused, _ = listen(build_agent("reuse", inference), heard)
     np.testing.assert_allclose(beliefs.mean, reused.mean, atol=1e-5)  # it listens
+    told = np.stack([family[:, 2] == GOAL, target[:, 2] / 10.0], axis=-1).astype(np.float32)
+    states = jax.tree.map(lambda leaf: leaf[:DECISIONS, 2], heard.state)
+    acts = inference.parts.told_policy(states, Belief(told, 0 * told))
+    np.testing.assert_allclose(commands.action[:DECISIONS, 2], acts, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["readout", "flat"])
+def test_what_the_module_believes_does_not_depend_on_who_acts(inference, heard, kind):
+    beliefs, _ = listen(build_agent(kind, inference), heard)
+    reused, _ = listen(build_agent("reuse", inference), heard)
+    np.testing.assert_allclose(beliefs.mean, reused.mean, atol=1e-5)
+
+
+def test_bayes_hears_the_same_and_knows_after_two_rewards(inference, heard):
+    agent = build_agent("bayes", inference)
+    _, commands = listen(agent, heard)
+    np.testing.assert_array_equal(commands.subgoal.value[0], np.zeros(SIZE))
+    np.testing.assert_allclose(commands.subgoal.value[3:], 3.0, atol=0.011)  # the goal of what was heard
 
 
 def test_the_idle_agent_stands_still(inference, heard):

@@ -8,8 +8,9 @@ import pytest
 
 from rebody.agents.build import check_fit
 from rebody.agents.parts import load_flat, load_inference, load_tracker
+from rebody.bodies.toys import MassDamper, PositionToy, describe_toy
 from rebody.errors import RebodyError
-from rebody.store import save_artifact, tree_hash
+from rebody.store import save_artifact, tree_hash, tree_to_arrays
 
 X = np.linspace(-3, 3, 5, dtype=np.float32)
 
@@ -20,7 +21,9 @@ def saved(inference, stored_config, tmp_path):
 
     def save(**changes):
         config = stored_config | {name: stored_config[name] | change for name, change in changes.items()}
-        save_artifact(tmp_path / "module", kind="inference", config=config, weights=inference.parts, card="# Tiny\n", log="")
+        save_artifact(
+            tmp_path / "module", kind="inference", config=config, weights=inference.parts, card="# Tiny\n", log=""
+        )
         return str(tmp_path / "module")
 
     return save
@@ -33,7 +36,22 @@ def test_a_loaded_module_is_the_saved_one(inference, saved):
         inference.parts, lambda leaf: not eqx.is_array(leaf)
     )
     assert loaded.contract == inference.contract
-    assert loaded.toy.max_force == 5.0
+    assert loaded.toy == MassDamper(max_force=5.0)
+
+
+def test_a_module_comes_with_the_toy_that_it_learned_on(saved, stored_config, monkeypatch):
+    monkeypatch.setitem(stored_config, "toy", describe_toy(PositionToy(max_step=0.3)))
+    assert load_inference(saved()).toy == PositionToy(max_step=0.3)
+    with pytest.raises(RebodyError, match=r"unknown toy 'spring'\. Toys are: mass-damper, position"):
+        load_inference(saved(toy={"kind": "spring"}))
+
+
+def test_a_module_without_the_toys_oracle_is_not_understood(inference, stored_config, tmp_path):
+    """As an earlier release made it."""
+    arrays = {name: a for name, a in tree_to_arrays(inference.parts).items() if not name.startswith("told_policy")}
+    save_artifact(tmp_path / "old", kind="inference", config=stored_config, weights=arrays, card="", log="")
+    with pytest.raises(RebodyError, match="does not fit what is built here"):
+        load_inference(str(tmp_path / "old"))
 
 
 def test_a_module_of_other_sizes_is_refused(saved):
@@ -58,6 +76,20 @@ def test_a_loaded_tracker_acts_as_the_saved_one(tracker, tmp_path):
     assert (loaded.robot, loaded.tracker.max_distance, loaded.tracker.max_speed) == ("cheetah", 5.0, 3.0)
     with pytest.raises(RebodyError):
         load_inference(str(tmp_path / "t"))
+
+
+def test_a_loaded_flat_policy_acts_as_the_saved_one(flat_policy, tmp_path):
+    config = {
+        "robot": "cheetah", "inference_hash": "abc", "reach": 10.0, "observations": 22, "actions": 6, "hidden": [8],
+        "projections": 0,
+    }  # fmt: skip
+    save_artifact(tmp_path / "f", kind="flat", config=config, weights=flat_policy, card="# Tiny\n", log="")
+    loaded = load_flat(str(tmp_path / "f"))
+    assert tree_hash(loaded.policy) == tree_hash(flat_policy)
+    assert (loaded.name, loaded.robot, loaded.inference_hash, loaded.policy.reach) == ("f", "cheetah", "abc", 10.0)
+    save_artifact(tmp_path / "f", kind="flat", config={"robot": "cheetah"}, weights=flat_policy, card="", log="")
+    with pytest.raises(RebodyError, match="settings of artifact 'f' are not understood"):
+        load_flat(str(tmp_path / "f"))
 
 
 def test_check_fit_names_the_robot(inference):

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rebody.agents import rollout
-from rebody.agents.agent import Observation
+from rebody.agents.agent import IdleAgent, Observation
 from rebody.agents.build import build_agent
-from rebody.agents.controller import TrackerController
+from rebody.agents.controller import FlatController, TrackerController
 from rebody.agents.live import LiveAgent
 from rebody.agents.parts import LoadedTracker
 from rebody.agents.rollout import begin, decide, joint_action, rollout_on_robot, rollout_on_toy
@@ -19,7 +19,7 @@ from rebody.bodies import RobotBatch
 from rebody.errors import RebodyError
 from rebody.store import tree_hash
 from rebody.tasks import GOAL, reward
-from rebody.types import GlobalState, Task, Transition
+from rebody.types import Belief, GlobalState, Task, Transition
 
 WINDOW = 6
 SEEDS = np.array([7, 8, 9])
@@ -157,6 +157,86 @@ def test_toy_episodes_are_those_stepped_by_hand(agent, inference):
         assert_same(now, (state, earned, carry.belief, held), atol=1e-5, rtol=1e-5)
     assert not episodes.fell.any()
     assert np.abs(episodes.state.x[-1]).min() > 0.01  # it moves
+
+
+class Listener(eqx.Module):
+    """Believes nothing but what it heard last: how many transitions so far, vx, reward, x before and after."""
+
+    def initial(self, shape):
+        return jnp.zeros(shape)
+
+    def prior(self, shape):
+        return Belief(jnp.zeros((*shape, 5)), jnp.ones((*shape, 5)))
+
+    def step(self, ticks, transition):
+        state, before = transition.state, transition.previous
+        mean = jnp.stack([ticks + 1, state.vx, transition.reward, before.x, state.x], axis=-1)
+        return ticks + 1, Belief(mean, jnp.ones_like(mean))
+
+
+@pytest.mark.parametrize("tick_steps", [1, 2, 3, 4, 5])
+def test_in_thesis_mode_the_module_hears_of_the_world_once_per_stride(tracker, cheetah, tick_steps):
+    """What is returned stays 0.1 s apart, and velocities are those of the last 0.1 s, also between decisions."""
+    task, qpos = lasting(1.0), []
+    task.target[WINDOW // 2 :] = -1.0
+    listener = IdleAgent(inferrer=Listener(), reader=lambda belief: None, stride=1)
+    episodes = rollout_on_robot(
+        listener, TrackerController(tracker), cheetah, task, "plain", SEEDS[:1],
+        lambda batch, _: qpos.append(batch.qpos[0].copy()), tick_steps,
+    )  # fmt: skip
+    x = np.concatenate([[0.0], np.array(qpos)[:, 0]])  # after each control step
+    assert len(qpos) == 2 * WINDOW
+    np.testing.assert_allclose(episodes.state.x[:, 0], x[2::2], atol=1e-6)
+    np.testing.assert_allclose(episodes.state.vx[:, 0], (x[2::2] - x[:-2:2]) / 0.1, atol=1e-5)
+    np.testing.assert_allclose(episodes.reward, -np.abs(episodes.state.x - task.target), atol=1e-6)
+    for i in range(WINDOW):
+        ticks = (2 * i + 2) // tick_steps
+        step = ticks * tick_steps  # of the last tick by then
+        before = max(step - 2, 0)  # it stood still before it began
+        heard = [ticks, 0, 0, 0, 0]
+        if ticks:
+            target = task.target[(step - 1) // 2, 0]
+            heard = [ticks, (x[step] - x[before]) / 0.1, -abs(x[step] - target), x[step - tick_steps], x[step]]
+        np.testing.assert_allclose(episodes.belief.mean[i, 0], heard, atol=1e-5)
+
+
+def test_a_tick_per_decision_is_the_default_bit_for_bit(agent, tracker, cheetah, episodes):
+    controller, tasks = TrackerController(tracker), lasting(*TARGETS)
+    ticked = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS, None, cheetah.steps_per_decision)
+    assert_same(ticked, episodes, rtol=0, atol=0)
+    seldom = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS, None, 5)
+    assert np.abs(seldom.belief.mean - episodes.belief.mean).max() > 1e-3
+
+
+def test_a_flat_policy_moves_by_the_belief_alone(inference, flat_policy, cheetah):
+    agent, tasks = build_agent("flat", inference), lasting(*TARGETS)
+    controller = FlatController(flat_policy)
+    episodes = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS)
+    assert np.isnan(episodes.subgoal.value).all()
+    assert np.isfinite(episodes.state.x).all()
+    deaf = IdleAgent(inferrer=Deaf(), reader=lambda belief: None, stride=1)
+    deaf = rollout_on_robot(deaf, controller, cheetah, tasks, "plain", SEEDS)
+    np.testing.assert_allclose(deaf.state.x[0], episodes.state.x[0], atol=1e-5)  # both begin with the prior
+    assert np.abs(deaf.state.x[-1] - episodes.state.x[-1]).min() > 1e-4
+
+
+class Deaf(eqx.Module):
+    """Keeps to the prior."""
+
+    def initial(self, shape):
+        return jnp.zeros(shape)
+
+    def prior(self, shape):
+        return Belief(jnp.zeros((*shape, 2)), jnp.ones((*shape, 2)))
+
+    def step(self, memory, transition):
+        return memory, self.prior(memory.shape)
+
+
+def test_bayes_finds_goals_on_the_toy(inference):
+    episodes = rollout_on_toy(build_agent("bayes", inference), inference.toy, lasting(*TARGETS), "plain")
+    np.testing.assert_allclose(episodes.subgoal.value[-1], TARGETS, atol=0.011)
+    np.testing.assert_array_equal(episodes.subgoal.slot, np.full((WINDOW, 3), GOAL))
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.bodies.toys import MassDamper, PositionToy, Randomisation, no_disturbance
+from rebody.bodies.toys import (
+    MassDamper,
+    PositionToy,
+    Randomisation,
+    describe_toy,
+    make_toy,
+    no_disturbance,
+)
+from rebody.errors import RebodyError
 from rebody.types import DECISION_DT, GlobalState
 
 TOYS = [MassDamper(), PositionToy()]
@@ -132,3 +140,22 @@ def test_from_global_takes_the_place_of_any_body():
     again = MassDamper().from_global(MassDamper().observe(state))
     np.testing.assert_array_equal(again.x, [2.0])
     np.testing.assert_array_equal(again.drift, [-1.0])
+
+
+@pytest.mark.parametrize(
+    ("toy", "described"),
+    [
+        (MassDamper(), {"kind": "mass-damper", "mass": 1.0, "damping": 2.0, "max_force": 7.0}),
+        (MassDamper(mass=2.0), {"kind": "mass-damper", "mass": 2.0, "damping": 2.0, "max_force": 7.0}),
+        (PositionToy(0.3), {"kind": "position", "max_step": 0.3}),
+    ],
+)
+def test_a_toy_is_made_again_from_its_description(toy, described):
+    assert describe_toy(toy) == described
+    assert make_toy(**described) == toy
+
+
+def test_toys_have_names():
+    assert make_toy("position") == PositionToy()
+    with pytest.raises(RebodyError, match=r"unknown toy 'spring'\. Toys are: mass-damper, position"):
+        make_toy("spring")

@@ -25,10 +25,12 @@ def position(tmp_path: Path) -> Path:
     return Path(shutil.copytree(SHIPPED / "position", tmp_path / "position"))
 
 
-def test_list_names_bodies_families_presets_and_artifacts(capsys: pytest.CaptureFixture[str]):
+def test_list_names_whatever_there_is(capsys: pytest.CaptureFixture[str]):
     assert run(["list"]) == 0
     printed = capsys.readouterr().out
-    for name in ("point-mass", "cheetah", "goal", "velocity", "position", "tracker-cheetah"):
+    for name in (
+        "point-mass", "cheetah", "goal", "velocity", "readout", "bayes", "position-thesis", "tracker-cheetah", "6.9",
+    ):  # fmt: skip
         assert name in printed
 
 

@@ -6,6 +6,8 @@ import shutil
 import numpy as np
 import pytest
 
+from rebody.agents.parts import load_inference
+from rebody.bodies.toys import MassDamper, PositionToy
 from rebody.cli.main import run
 from rebody.store import load_artifact, save_artifact
 
@@ -85,6 +87,71 @@ def test_oracle_and_idle_do_not_listen_to_the_module(trained, evaluate):
         assert set(still["subgoal_family"]) == {"velocity"}
         assert set(still["subgoal"]) == {0.0}
         assert still["oracle_return"] == pytest.approx(told["return"])
+
+
+def test_thesis_mode_takes_the_thesis_horizon(trained, evaluate):
+    tracker = ["--robot", "cheetah", "--tracker", str(trained["tracker"])]
+    for options, mode in (
+        ((), (False, 1, 15)),
+        (("--thesis", "--stride", "10"), (True, 10, 1)),
+        (("--thesis", "--horizon", "4"), (True, 1, 4)),
+    ):
+        code, results = evaluate(*tracker, *options)
+        assert code == 0
+        assert (results["thesis"], results["stride"], results["horizon"]) == mode
+
+
+@pytest.mark.parametrize("agent", ["readout", "bayes"])
+def test_what_is_read_is_handed_to_the_tracker(agent, trained, evaluate):
+    _, results = evaluate("--robot", "cheetah", "--tracker", str(trained["tracker"]), "--agent", agent)
+    assert results["agent"] == agent
+    for episode in results["episodes"]:
+        assert episode["subgoal"][1:] == episode["inferred_target"][:-1]
+        assert set(episode["subgoal_family"]) == {"goal"}
+
+
+def test_an_own_flat_policy_is_judged(trained, evaluate, tmp_path, capsys):
+    parts = ["--robot", "cheetah", "--tracker", str(trained["tracker"]), "--agent", "flat"]
+    code, results = evaluate(*parts, "--flat", str(trained["flat"]))
+    assert code == 0
+    assert "cheetah, flat" in capsys.readouterr().out
+    for episode in results["episodes"]:
+        assert episode["subgoal"] == [None] * DECISIONS
+        assert isinstance(episode["oracle_return"], float)
+    run_it = ["run", "--task", "goal=2", "--inference", str(trained["inference"]), *parts, "--seconds", SECONDS]
+    figure = tmp_path / "flat.png"
+    assert run([*run_it, "--flat", str(trained["flat"]), "--figure", str(figure)]) == 0
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_flat_policy_of_another_module_or_robot_is_refused(trained, evaluate, tmp_path, capsys):
+    loaded = load_artifact(trained["flat"], "flat")
+    for change, said in (
+        ({"inference_hash": "0" * 64}, "another module than 'inference'"),
+        ({"robot": "walker"}, "trained on 'walker', not on 'cheetah'"),
+    ):
+        changed = {"config": loaded.config | change, "weights": loaded.arrays, "card": loaded.card, "log": loaded.log}
+        save_artifact(tmp_path / "other", kind="flat", **changed)
+        parts = ["--tracker", str(trained["tracker"]), "--agent", "flat", "--flat", str(tmp_path / "other")]
+        code, results = evaluate(*parts)
+        refused(code, capsys, said)
+        assert results is None
+
+
+@pytest.mark.usefixtures("measured_in_short")
+def test_a_module_of_the_position_toy(tiny_training, tmp_path):
+    """The thesis' first experiment, untrained; any setting of a preset can be changed."""
+    untrained = ["--wander-iterations", "0", "--joint-iterations", "0", "--policy-iterations", "0"]
+    out = str(tmp_path / "thesis")
+    assert run([*tiny_training["inference"], *untrained, "--preset", "position-thesis", "--out", out]) == 0
+    loaded = load_inference(out)
+    assert loaded.toy == PositionToy()
+    assert loaded.contract.target_ranges == {"goal": (0.0, 10.0)}
+    assert loaded.parts.module.encoder.latent == 1
+    assert loaded.parts.high_level.fields == loaded.parts.told_policy.fields == ("x",)
+    other = [*tiny_training["inference"], *untrained, "--preset", "position-thesis", "--toy", "mass-damper"]
+    assert run([*other, "--out", str(tmp_path / "other")]) == 0
+    assert load_inference(str(tmp_path / "other")).toy == MassDamper()
 
 
 def test_the_same_command_writes_the_same_results(trained, evaluate):

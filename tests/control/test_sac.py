@@ -6,7 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.control.sac import SACBatch, SACConfig, initial_state, update
+from rebody.control.sac import SACBatch, SACConfig, initial_state, take_over, update, update_many
+from rebody.errors import RebodyError
 from rebody.store import arrays_into_tree, load_artifact, save_artifact, tree_hash, tree_to_arrays
 
 SIZE = 512
@@ -163,6 +164,38 @@ def test_golden_values_of_one_update(one_update):
     }
     found = {name: float(value.mean()) for name, value in (metrics | after).items()}
     assert found == pytest.approx(GOLDEN, abs=1e-4)
+
+
+def test_many_updates_are_one_after_the_other(small_config):
+    """Each with its own inputs and keys; metrics are means."""
+    keys = jax.random.split(jax.random.key(5), 3)
+    shifts = jnp.asarray([0.0, 0.3, -0.5])
+
+    def batch_of(shift, key):
+        batch = small_batch()
+        return eqx.tree_at(lambda b: b.reward, batch, batch.reward + shift + jax.random.uniform(key))
+
+    begun = initial_state(2, 1, small_config, jax.random.key(0))
+    found, metrics = eqx.filter_jit(update_many)(begun, batch_of, shifts, keys, small_config)
+    one, state, losses = eqx.filter_jit(update), begun, []
+    for shift, key in zip(shifts, keys, strict=True):
+        batch_key, update_key = jax.random.split(key)
+        state, measured = one(state, batch_of(shift, batch_key), update_key, small_config)
+        losses.append(float(measured["critic_loss"]))
+    observation = small_batch().observation
+    np.testing.assert_allclose(found.actor(observation), state.actor(observation), atol=1e-4)
+    assert np.abs(found.actor(observation) - begun.actor(observation)).max() > 1e-3
+    assert float(metrics["critic_loss"]) == pytest.approx(np.mean(losses), rel=1e-3)
+    assert np.ptp(losses) > 0.01
+
+
+def test_a_trained_actor_is_taken_over_where_it_fits(small_config):
+    state, other = (initial_state(2, 1, small_config, jax.random.key(seed)) for seed in (0, 1))
+    taken = take_over(state, other.actor, "mine")
+    assert tree_hash(taken.actor) == tree_hash(taken.averaged_actor) == tree_hash(other.actor)
+    assert tree_hash(taken.critics) == tree_hash(state.critics)
+    with pytest.raises(RebodyError, match="cannot start from 'mine': its networks have other sizes"):
+        take_over(state, initial_state(3, 1, small_config, jax.random.key(0)).actor, "mine")
 
 
 def test_same_seed_same_result(one_update):

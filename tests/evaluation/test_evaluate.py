@@ -1,11 +1,14 @@
 """A whole evaluation on tiny parts, and what is refused before it starts."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from rebody.agents.build import AGENTS
 from rebody.bodies import load_robot
+from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results
 from rebody.evaluation.evaluate import POINT_MASS
@@ -69,6 +72,81 @@ def test_the_idle_agent_is_the_same_on_every_task(trial):
     assert first.reward != second.reward
 
 
+def on_the_toy(trial, **changes):
+    return replace(trial, robot=None, tracker=None, flat=None, **changes)
+
+
+@pytest.mark.parametrize("agent", [kind for kind in AGENTS if kind != "flat"])
+def test_point_mass(trial, agent):
+    results = evaluate(on_the_toy(trial, agent=agent), SPECS, 1)
+    assert (results.robot, results.agent, results.tracker, results.control_dt) == (POINT_MASS, agent, None, 0.1)
+    oracle = evaluate(on_the_toy(trial, agent="oracle"), SPECS, 1)
+    told = [episode.return_ for episode in oracle.episodes]
+    assert [episode.oracle_return for episode in results.episodes] == pytest.approx(told, rel=1e-5)
+    x = np.array([episode.position_m for episode in results.episodes])
+    if agent == "idle":
+        assert not x.any()
+    else:
+        assert np.abs(x[:, -1]).min() > 0.01
+
+
+def test_on_the_toy_the_oracle_is_told_the_active_task_and_regrets_nothing(trial):
+    oracle = evaluate(on_the_toy(trial, agent="oracle"), SPECS, 1)
+    assert [episode.subgoal for episode in oracle.episodes] == [episode.active_target for episode in oracle.episodes]
+    assert oracle.summary["regret"]["value"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_bayes_reads_the_active_task_from_the_toy(trial):
+    """Also after a switch, and told about in the same words as a module's belief."""
+    for episode in evaluate(on_the_toy(trial, agent="bayes"), SPECS, 1).episodes:
+        known = np.r_[3:12, 15:30] if episode.switch else np.r_[3:30]
+        np.testing.assert_allclose(
+            np.array(episode.inferred_target)[known], np.array(episode.active_target)[known], atol=0.011
+        )
+        assert set(episode.inferred_family) == {"goal"}
+        assert episode.subgoal[1:] == episode.inferred_target[:-1]
+
+
+def test_a_point_mass_may_be_another_one_than_the_module_learned_on(trial):
+    slow = evaluate(on_the_toy(trial, agent="bayes", toy=PositionToy(max_step=0.02)), SPECS[:1], 1).episodes[0]
+    fast = evaluate(on_the_toy(trial, agent="bayes"), SPECS[:1], 1).episodes[0]
+    assert np.abs(np.diff(slow.position_m)).max() <= 0.02 + 1e-5
+    assert np.abs(np.diff(fast.position_m)).max() > 0.02 + 1e-3
+
+
+def test_a_flat_policy_has_no_subgoal(trial, tmp_path):
+    flat = evaluate(replace(trial, agent="flat"), SPECS[:1], 1)
+    assert flat.episodes[0].subgoal == [None] * 30
+    oracle = evaluate(replace(trial, agent="oracle"), SPECS[:1], 1)
+    assert flat.episodes[0].oracle_return == pytest.approx(oracle.episodes[0].return_, rel=1e-3)
+    save_results(flat, tmp_path / "flat.json")
+    saved = json.loads((tmp_path / "flat.json").read_text(), parse_constant=pytest.fail)
+    assert saved["episodes"][0]["subgoal"] == [None] * 30
+    alone = evaluate(replace(trial, agent="flat", tracker=None), SPECS[:1], 1)
+    assert alone.episodes[0].position_m == flat.episodes[0].position_m
+    assert alone.summary["regret"] is None  # a robot's oracle needs a tracker
+
+
+def test_thesis_mode_with_a_decisions_worth_of_control_steps_is_our_mode(trial, results):
+    thesis = evaluate(replace(trial, thesis=True, stride=2), SPECS, SEEDS)
+    assert (thesis.thesis, thesis.stride, results.thesis) == (True, 2, False)
+    assert thesis.episodes == results.episodes
+
+
+def test_in_thesis_mode_a_belief_lasts_a_stride(trial, results):
+    seldom = evaluate(replace(trial, thesis=True, stride=10), SPECS, SEEDS)  # 0.5 s
+    for episode, ours in zip(seldom.episodes, results.episodes, strict=True):
+        latent = np.array(episode.latent)
+        changes = np.flatnonzero((latent[1:] != latent[:-1]).any(axis=-1)) + 1
+        np.testing.assert_array_equal(changes, np.arange(4, 30, 5))
+        assert len(episode.time_s) == 30
+        assert episode.oracle_return == pytest.approx(ours.oracle_return, rel=1e-6)  # the oracle is no thesis
+
+
+def of_another_module(trial):
+    return replace(trial.flat, inference_hash="0" * 64)
+
+
 REFUSED = {
     "was trained on 'cheetah', not on 'hopper'": lambda trial: (
         replace(trial, robot=replace(load_robot("cheetah"), name="hopper")), SPECS,
@@ -80,6 +158,24 @@ REFUSED = {
     "--seconds 2.9 is too short": lambda trial: (replace(trial, seconds=2.9), SPECS),
     "a switch at 3 s is not within an episode of 3 s": lambda trial: (
         trial, [TaskSpec("goal", 1.0, Switch(3.0, "goal", 2.0))],
+    ),
+    "flat policy 'tiny-flat' was trained on the beliefs of another module than 'tiny'": lambda trial: (
+        replace(trial, agent="flat", flat=of_another_module(trial)), SPECS,
+    ),
+    "'tiny-flat' was trained on 'walker', not on 'cheetah'": lambda trial: (
+        replace(trial, agent="flat", flat=replace(trial.flat, robot="walker")), SPECS,
+    ),
+    "agent 'flat' moves the joints of a robot, and a point mass has none": lambda trial: (
+        replace(trial, agent="flat", robot=None), SPECS,
+    ),
+    "thesis mode is for the agents reuse, readout, bayes, not for 'oracle'": lambda trial: (
+        replace(trial, agent="oracle", thesis=True), SPECS,
+    ),
+    "thesis mode is for the agents .*not for 'flat'": lambda trial: (
+        replace(trial, agent="flat", thesis=True), SPECS,
+    ),
+    "'tiny' was trained on goal and cannot infer 'velocity'. Choose": lambda trial: (
+        replace(trial, agent="oracle", robot=None, tracker=None, flat=None), [TaskSpec("velocity", 1.0)],
     ),
     "unknown agent 'resue'": lambda trial: (replace(trial, agent="resue"), SPECS),
     "its encoder sees x, which 'cheetah' does not have": lambda trial: (

@@ -1,5 +1,7 @@
 """Training runs lose nothing: killed, interrupted, diverged, resumed."""
 
+import csv
+import io
 import os
 import signal
 import subprocess
@@ -14,7 +16,7 @@ import pytest
 import tensorboardX.proto.event_pb2
 from rich.markdown import Markdown
 
-from rebody.store import tree_hash
+from rebody.store import load_artifact, tree_hash
 from rebody.training.run import Run
 
 LIVES = (0, 0, 1, 1, 1)
@@ -52,6 +54,12 @@ def test_killed_at_random_moments_it_ends_as_if_nothing_had_been(graveyard, pipe
     assert not (killed / "manifest.json").exists()
     assert pipeline(killed, "--resume") == 0
     assert pipeline.end(killed) == pipeline.end(tmp_path / "calm")
+    assert logged(killed) == logged(tmp_path / "calm")
+
+
+def logged(out):
+    """Rows of a finished run's log."""
+    return list(csv.DictReader(io.StringIO((out / "log.csv").read_text())))
 
 
 def test_ctrl_c_saves_first_and_says_how_to_go_on(pipeline, tmp_path, after_turn, read_checkpoint, capsys):
@@ -69,6 +77,10 @@ def test_ctrl_c_saves_first_and_says_how_to_go_on(pipeline, tmp_path, after_turn
     assert read_checkpoint(out)["iteration"] == 2
     assert pipeline(out, "--resume") == 0
     assert pipeline.end(out) == pipeline.end(tmp_path / "calm")
+    assert logged(out) == logged(tmp_path / "calm")
+    # TensorBoard forgets what an earlier life told of turns that are taken again
+    begins = [event.step for event in events(out / "events") if event.HasField("session_log")]
+    assert begins[-1] == 3  # a life that begins within the same second writes over the file of the one before
 
 
 def test_a_seed_decides_everything(pipeline, tmp_path):
@@ -232,26 +244,40 @@ def test_a_state_that_is_not_finite_never_replaces_a_checkpoint(
 
 
 def events(folder):
-    """(step, tag, value) of every scalar in the TensorBoard files of a folder."""
+    """Every event in the TensorBoard files of a folder."""
     for path in sorted(folder.glob("events.out.tfevents.*")):
         data = path.read_bytes()
         while data:
             size = int.from_bytes(data[:8], "little")  # a length, its checksum, the event, its checksum
-            event = tensorboardX.proto.event_pb2.Event.FromString(data[12 : 12 + size])
+            yield tensorboardX.proto.event_pb2.Event.FromString(data[12 : 12 + size])
             data = data[16 + size :]
-            for value in event.summary.value:
-                yield event.step, value.tag, value.simple_value
 
 
-def test_curves_are_written_for_tensorboard(pipeline, tmp_path):
+def test_curves_are_written_for_tensorboard_and_as_csv(pipeline, tmp_path):
     assert pipeline(tmp_path / "run") == 0
     curves = {}
-    for step, tag, value in events(tmp_path / "run" / "events"):
-        curves.setdefault(tag, {})[step] = value
+    for event in events(tmp_path / "run" / "events"):
+        for value in event.summary.value:
+            curves.setdefault(value.tag, {})[event.step] = value.simple_value
     assert {"critic_loss", "actor_loss", "temperature", "entropy", "value"} <= curves.keys()
     begin = 2 if pipeline.name == "inference" else 1  # while all toys wander, no policy learns
     assert list(curves["critic_loss"]) == list(range(begin, TURNS + 1))
     assert all(np.isfinite(list(curve.values())).all() for curve in curves.values())
+
+    rows = logged(tmp_path / "run")
+    assert [row["iteration"] for row in rows] == [str(i + 1) for i in range(TURNS)]
+    assert rows[0].keys() == {"iteration", *curves}
+    for name, curve in curves.items():
+        measured = {i: float(row[name]) for i, row in enumerate(rows, 1) if row[name]}
+        assert measured == pytest.approx(curve, rel=1e-5), name
+    assert load_artifact(tmp_path / "run", pipeline.name).log == (tmp_path / "run" / "log.csv").read_text()
+
+
+def test_a_log_has_a_row_per_iteration_and_a_column_per_name(tmp_path):
+    run = Run(tmp_path / "run", {})
+    assert run.log == "iteration\n"
+    run.history = [{"loss": 0.5}, {"loss": 1234567.0, "evaluation/p95, m": -1.0}, {"entropy": 1e-9}]
+    assert run.log == 'iteration,loss,"evaluation/p95, m",entropy\n1,0.5,,\n2,1.23457e+06,-1,\n3,,,1e-09\n'
 
 
 def test_the_card_says_how_it_was_made(pipeline, tmp_path, monkeypatch, capsys):

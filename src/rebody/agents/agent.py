@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -29,6 +29,7 @@ class Command(eqx.Module):
     subgoal: Subgoal
 
 
+@runtime_checkable  # so that annotations can be checked
 class Inferrer(Protocol):
     """What believes: a trained encoder, or the exact posterior in its place."""
 

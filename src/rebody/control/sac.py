@@ -12,7 +12,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optax
-from jaxtyping import Float, PRNGKeyArray
+from jaxtyping import Float, Key, PRNGKeyArray
 
 from rebody.errors import RebodyError
 from rebody.nn import MLP, MultiScale
@@ -179,7 +179,7 @@ def update_many(
     state: SACState,
     batch_of: Callable[[Any, PRNGKeyArray], SACBatch],
     inputs: Any,
-    keys: PRNGKeyArray,
+    keys: Key[AnyArray, " update"],
     config: SACConfig,
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """An update per key in one scan; `batch_of` makes its batch from one entry of `inputs` and a key.

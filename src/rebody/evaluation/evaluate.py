@@ -126,6 +126,8 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
         raise RebodyError(f"thesis mode is for the agents {', '.join(THESIS_AGENTS)}, not for '{trial.agent}'.")
     _check_tasks(trial, specs)
     if trial.robot is None:
+        if trial.thesis and trial.stride > 1:
+            raise RebodyError("in thesis mode a stride counts control steps of a robot; a point mass has none.")
         if trial.agent == "flat":
             raise RebodyError("agent 'flat' moves the joints of a robot, and a point mass has none.")
         return

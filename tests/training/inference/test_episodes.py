@@ -7,8 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.bodies.toys import MassDamper, Randomisation
+from rebody.bodies.toys import MassDamper, Randomisation, make_toy
 from rebody.control.high_level import policy_observation
+from rebody.tasks import GOAL
 from rebody.training.inference.episodes import collect, refresh_beliefs, roles
 from rebody.types import Transition
 
@@ -51,6 +52,8 @@ def test_one_hidden_task_explains_all_rewards_of_an_episode(episodes):
     targets = np.where(misses[0] < misses[1], *first[..., 0])
     assert (np.abs(targets) <= 10).all()
     assert len(set(targets.round(3))) == len(targets)
+    np.testing.assert_allclose(targets, episodes.task.target, atol=1e-4)
+    np.testing.assert_array_equal(episodes.task.family, np.full(len(targets), GOAL))
 
 
 def test_the_first_half_is_nominal_and_moves_by_its_actions(episodes, config):
@@ -59,6 +62,13 @@ def test_the_first_half_is_nominal_and_moves_by_its_actions(episodes, config):
     speed = vx[:, :-1] + 0.1 * (7.0 * action - 2.0 * vx[:, :-1])
     np.testing.assert_allclose(vx[:, 1:], speed, atol=1e-5)
     np.testing.assert_allclose(x[:, 1:], x[:, :-1] + 0.1 * speed, atol=1e-5)
+
+
+def test_on_the_position_toy_a_step_is_a_tenth_of_a_metre_at_most(config, state):
+    calm = replace(config, randomisation=Randomisation(0.0, lag=0.0, gain=(1.0, 1.0)), start=(12.0, 0.0))
+    key = jax.random.key(4)
+    moved = collect(state.module.encoder, state.sac.actor, make_toy("position"), calm, roles(8, True), key)
+    np.testing.assert_allclose(np.diff(moved.state.x, axis=1), 0.1 * moved.action[..., 0], atol=1e-5)
 
 
 def test_the_second_half_is_disturbed(episodes, config):
@@ -119,7 +129,7 @@ def test_refreshing_changes_nothing_but_beliefs(episodes, state):
     groups = jax.tree.map(lambda leaf: leaf[None], episodes)
     fresh = refresh_beliefs(other, groups)
     assert np.abs(fresh.belief.mean - groups.belief.mean).max() > 1e-3
-    for name in ("state", "action", "reward"):
+    for name in ("task", "state", "action", "reward"):
         for new, old in zip(*map(jax.tree.leaves, (getattr(fresh, name), getattr(groups, name))), strict=True):
             np.testing.assert_array_equal(new, old)
 

@@ -13,7 +13,7 @@ from rebody.store import tree_hash
 from rebody.tasks import GOAL
 from rebody.training.inference import train
 from rebody.training.inference.episodes import Episodes
-from rebody.training.inference.train import sample_evidence, sample_transitions, store
+from rebody.training.inference.train import sample_evidence, sample_transitions, store, tell, trained_parts
 from rebody.types import Belief, GlobalState, Task
 
 
@@ -102,6 +102,37 @@ def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, con
     later = np.asarray(batch.next_observation).T
     np.testing.assert_array_equal(later[:4], [x + 1, vx + 1, *(mean + 1 for mean in belief[:2])])
     assert not np.asarray(batch.terminal).any()
+
+
+def test_the_oracle_is_told_the_task_of_its_episode_at_every_decision(labelled, config):
+    told = tell(labelled, config)
+    target = np.asarray(labelled.task.target)[..., None] / 10.0
+    assert told.belief.mean.shape == (*labelled.state.x.shape, 2)
+    np.testing.assert_array_equal(told.belief.mean[..., 0], np.ones(labelled.state.x.shape))
+    np.testing.assert_allclose(told.belief.mean[..., 1], np.broadcast_to(target, labelled.state.x.shape), rtol=1e-6)
+    assert not np.asarray(told.belief.variance).any()
+    for name in ("task", "state", "action", "reward"):
+        assert tree_hash(getattr(told, name)) == tree_hash(getattr(labelled, name))
+
+    plain = replace(config, policy_scales=(1.0, 1.0))
+    batch = sample_transitions(told, 3, plain, jax.random.key(0))
+    group, episode, _ = unpack(batch.observation[:, 0])
+    of_episode = np.asarray(labelled.task.target)[group, episode] / 10.0
+    for observation in (batch.observation, batch.next_observation):
+        expected = [np.ones(300), of_episode, np.zeros(300), np.zeros(300)]
+        np.testing.assert_allclose(observation[:, 2:].T, expected, rtol=1e-6)
+
+
+def test_what_is_kept_are_the_averaged_policies(state, config):
+    marked = eqx.tree_at(
+        lambda s: (s.sac.averaged_actor.net.mlp.biases[-1], s.told.averaged_actor.net.mlp.biases[-1]),
+        state,
+        (jnp.full(2, 1.0), jnp.full(2, 2.0)),
+    )
+    parts = trained_parts(marked, config)
+    assert tree_hash(parts.high_level.actor) == tree_hash(marked.sac.averaged_actor)
+    assert tree_hash(parts.told_policy.actor) == tree_hash(marked.told.averaged_actor)
+    assert tree_hash(parts.module) == tree_hash(state.module)
 
 
 def test_scales_divide_what_the_policy_sees(labelled, config):

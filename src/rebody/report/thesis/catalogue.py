@@ -107,6 +107,8 @@ FIGURES = {
 
 def find_figures(numbers: Sequence[str]) -> list[ThesisFigure]:
     """Figures by number, or `all`; RebodyError for one that there is not."""
+    if not numbers:
+        raise RebodyError(f"which figure? Figures are: {', '.join(FIGURES)}, or all.")
     if "all" in numbers:
         return list(FIGURES.values())
     for number in numbers:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import safetensors.numpy
 
-from rebody.evaluation.evaluate import Trial, run_trial, trial_agent
+from rebody.evaluation.evaluate import Trial, check_trial, run_trial, trial_agent
 from rebody.store import load_artifact
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT
@@ -27,7 +27,7 @@ def shipped(number: str) -> Callable[[], Data]:
 
 def save(data: Data, path: Path) -> None:
     """Write a log."""
-    safetensors.numpy.save_file({name: np.ascontiguousarray(array) for name, array in data.items()}, path)
+    safetensors.numpy.save_file({name: np.array(array, order="C") for name, array in data.items()}, path)
 
 
 def training_log(artifact: str | Path, kind: str) -> Data:
@@ -50,7 +50,9 @@ def trajectories(trial: Trial, targets: np.ndarray) -> Data:
 
     `decision_s` is the time from one decision to the next.
     """
-    tasks = active_tasks([TaskSpec("goal", float(target)) for target in targets], trial.decisions, DECISION_DT)
+    specs = [TaskSpec("goal", float(target)) for target in targets]
+    check_trial(trial, specs)
+    tasks = active_tasks(specs, trial.decisions, DECISION_DT)
     episodes = run_trial(trial, trial_agent(trial, tasks), tasks, np.zeros(len(targets), int))
     every = -(-trial.decisions // POINTS)
     kept = np.arange(every - 1, trial.decisions, every)

@@ -20,6 +20,7 @@ from rebody.control import sac
 from rebody.control.flat import FlatPolicy, flat_observation
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.tracker import Command, tracker_reward
+from rebody.errors import RebodyError
 from rebody.inference import Encoder, EncoderCarry
 from rebody.tasks import GOAL, BaseTask, RewardForm, TaskDistribution, reward
 from rebody.training.flat.config import FlatConfig
@@ -76,6 +77,8 @@ def train_flat(
     RebodyError if `out` holds another run, or module and robot do not fit; Interrupted on Ctrl-C.
     """
     spec, module = load_robot(robot), load_inference(inference)
+    if config.steps < spec.steps_per_decision:
+        raise RebodyError(f"--steps must be at least the {spec.steps_per_decision} control steps of a decision.")
     check_fit(module, spec.name, spec.moving_fields)
     settings = {"robot": robot, "inference": inference, "seed": seed, "init_from": init_from}
     run = Run(out, asdict(config) | settings, resume=resume)

@@ -36,6 +36,9 @@ class MetaConfig:
     """Variance of the noise on every observed field (thesis, captions of 6.20)."""
     start: tuple[float, float] = (12.0, 3.0)
     """Episodes start at uniformly random x [m] and vx [m/s] within these."""
+    turn_probability: float = 0.15
+    """Chance per decision that a wandering toy changes its mind. It must come to see goals from both sides: while it
+    stays on one, a belief in their mirror image explains all that it hears."""
     episodes: int = 48
     """Toys that move in parallel: the first half nominal, the other disturbed."""
     decisions: int = 200

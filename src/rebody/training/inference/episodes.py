@@ -13,9 +13,6 @@ from rebody.tasks import reward
 from rebody.training.inference.config import MetaConfig
 from rebody.types import AnyArray, Belief, GlobalState, Task, Transition
 
-TURN_PROBABILITY = 0.15
-"""Chance per decision that a wandering toy changes its mind."""
-
 
 class Roles(eqx.Module):
     """How each episode's toy acts; where neither holds it samples its policy."""
@@ -70,7 +67,7 @@ def collect(
         action_key, step_key, noise_key, wander_key = jax.random.split(key, 4)
         observation = policy_observation(seen, belief, config.policy_fields, config.policy_scales)
         sampled, _ = actor.sample(observation, action_key)
-        held = _wander(held, wander_key)
+        held = _wander(held, config.turn_probability, wander_key)
         action = jnp.where(roles.decides[:, None], actor(observation), sampled)
         action = jnp.where(roles.wanders[:, None], held, action)
         body = toy.step(body, action, step_key)
@@ -117,9 +114,11 @@ def _random_start(toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> ToyState:
     return toy.initial(x, vx, disturbance)
 
 
-def _wander(held: Float[AnyArray, "episode 1"], key: PRNGKeyArray) -> Float[AnyArray, "episode 1"]:
+def _wander(
+    held: Float[AnyArray, "episode 1"], turn_probability: float, key: PRNGKeyArray
+) -> Float[AnyArray, "episode 1"]:
     turn_key, action_key = jax.random.split(key)
-    turns = jax.random.bernoulli(turn_key, TURN_PROBABILITY, held.shape)
+    turns = jax.random.bernoulli(turn_key, turn_probability, held.shape)
     return jnp.where(turns, jax.random.uniform(action_key, held.shape, minval=-1.0), held)
 
 

@@ -48,6 +48,7 @@ def position_thesis() -> MetaConfig:
         policy_scales=(10.0,),
         randomisation=Randomisation(ripple_amplitude=0.0, lag=0.0, gain=(1.0, 1.0)),
         start=(12.0, 0.0),
+        turn_probability=0.02,
     )
 
 

@@ -1,0 +1,44 @@
+"""What the policies of the toy and the flat policy of a robot are shown."""
+
+import numpy as np
+import pytest
+
+from rebody.agents.parts import task_code
+from rebody.control.flat import flat_observation
+from rebody.control.high_level import TaskCode, policy_observation
+from rebody.tasks import GOAL, VELOCITY
+from rebody.types import Belief, GlobalState, Task
+
+CODE = TaskCode(((GOAL, 10.0), (VELOCITY, 3.0)))
+BELIEF = Belief(np.array([0.5, -1.0], np.float32), np.array([0.25, 4.0], np.float32))
+
+
+def test_a_task_is_a_one_hot_and_the_same_times_its_scaled_target():
+    told = CODE(Task(np.array([GOAL, VELOCITY, GOAL]), np.array([-5.0, 1.5, 0.0], np.float32)))
+    np.testing.assert_allclose(told.mean, [[1, 0, -0.5, 0], [0, 1, 0, 0.5], [1, 0, 0, 0]], rtol=1e-6)
+    np.testing.assert_array_equal(told.variance, np.zeros((3, 4)))
+    np.testing.assert_allclose(told.features()[0], [1, 0, -0.5, 0, 0, 0, 0, 0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(), (4,), (2, 3)])
+def test_any_batch_shape(shape):
+    told = CODE(Task(np.full(shape, VELOCITY), np.full(shape, -3.0, np.float32)))
+    np.testing.assert_array_equal(told.mean, np.broadcast_to([0, 1, 0, -1], (*shape, 4)))
+
+
+def test_targets_are_divided_by_the_largest_of_their_family():
+    assert task_code({"goal": (-2.0, 10.0)}).scales == ((GOAL, 10.0),)
+    both = task_code({"velocity": (-3.0, 1.0), "goal": (2.0, 15.0)})
+    assert both.scales == ((VELOCITY, 3.0), (GOAL, 15.0))  # in the order of the ranges
+    np.testing.assert_allclose(both(Task(np.array(GOAL), np.array(-15.0, np.float32))).mean, [0, 1, 0, -1])
+
+
+def test_policies_see_scaled_fields_then_mean_and_deviation():
+    state = GlobalState(*(np.asarray(i, np.float32) for i in range(8)))
+    np.testing.assert_allclose(
+        policy_observation(state, BELIEF, ("vx", "x"), (2.0, 7.0)), [2.0, 0.0, 0.5, -1.0, 0.5, 2.0]
+    )
+    joints = np.array([0.1, -0.2], np.float32)
+    np.testing.assert_allclose(
+        flat_observation(joints, np.asarray(-5.0, np.float32), BELIEF, 10.0), [0.1, -0.2, -0.5, 0.5, -1.0, 0.5, 2.0]
+    )

@@ -1,0 +1,199 @@
+"""The thesis' figures: what they are drawn from, and that each of them is drawn."""
+
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import safetensors.numpy
+from PIL import Image
+
+from rebody.cli.main import run
+from rebody.errors import RebodyError
+from rebody.report.thesis import FIGURES, data, find_figures, make_figure
+from rebody.report.thesis import first_experiment as first
+from rebody.report.thesis.data import join, save, split, training_log, trajectories
+
+CAPTION = "What is seen, in so many words that a line does not hold all of them. " * 4 + "\nMade by a test."
+
+
+def episodes_of(latent, targets=(-9.0, 0.5, 4.0), decision_s=0.1, time=40):
+    """What `trajectories` gives, of agents that find their goals."""
+    time_s = 0.1 * np.arange(1.0, time + 1)
+    position = np.array(targets) * (1 - np.exp(-time_s))[:, None]
+    return {
+        "time_s": time_s,
+        "position_m": position,
+        "latent": np.stack([(i + 1) * position / 10 for i in range(latent)], axis=-1),
+        "target": np.array(targets),
+        "decision_s": np.array(decision_s),
+    }
+
+
+def curves_of(*names, measured_every=3, rows=12):
+    """What `training_log` gives, of measurements that were taken now and then."""
+    steps = 10_000.0 * np.arange(1, rows + 1, dtype=np.float32)
+    falling = np.where(np.arange(rows) % measured_every == measured_every - 1, 1e5 / steps, np.nan)
+    return {"steps": steps} | {name: falling.astype(np.float32) for name in names}
+
+
+PICTURE = {"picture": np.random.default_rng(0).integers(0, 255, (48, 64, 3)).astype(np.uint8)}
+STRIDES = {str(stride): episodes_of(1, decision_s=0.05 * stride) for stride in first.STRIDES}
+SYNTHETIC = {
+    "6.1": PICTURE,
+    "6.2": curves_of("return", "evaluation/return", "evaluation/oracle return"),
+    "6.3": episodes_of(1, targets=first.THESIS_GOALS),
+    "6.5": episodes_of(2),
+    "6.6": curves_of("task_reward", "evaluation/median error", "evaluation/p95 error"),
+    "6.7": curves_of(*(f"evaluation/{slot} {of}" for slot in ("goal", "velocity") for of in ("median", "p95"))),
+    "6.8": episodes_of(1, targets=(3.0,), decision_s=0.05),  # a single goal
+    "6.9": join(STRIDES | {"ours": episodes_of(2)}),
+}
+
+
+def assert_drawn(path):
+    with Image.open(path) as picture:
+        assert picture.format == "PNG"
+        pixels = np.asarray(picture.convert("L"))
+    assert min(pixels.shape) > 300
+    assert (pixels < 128).mean() > 0.003  # there is something on it
+    assert (pixels[-pixels.shape[0] // 8 :] < 128).mean() > 0.003  # and a caption below
+    assert not plt.get_fignums()  # nothing stays open
+
+
+@pytest.mark.parametrize("number", FIGURES)
+def test_every_figure_can_be_drawn(number, tmp_path):
+    FIGURES[number].draw(SYNTHETIC[number], tmp_path / "figure.png", CAPTION)
+    assert_drawn(tmp_path / "figure.png")
+
+
+@pytest.mark.parametrize("number", FIGURES)
+def test_every_figure_ships(number, tmp_path, capsys):
+    assert run(["figure", number, "--out", str(tmp_path)]) == 0
+    assert_drawn(tmp_path / f"{number}.png")
+    assert f"{number}.png: {FIGURES[number].title}" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == [f"{number}.png"]
+
+
+def test_what_is_drawn_depends_on_the_log(tmp_path):
+    pixels = []
+    for i, latent in enumerate((1, 2, 2)):
+        FIGURES["6.5"].draw(episodes_of(latent), tmp_path / f"{i}.png", CAPTION)
+        with Image.open(tmp_path / f"{i}.png") as picture:
+            pixels.append(np.asarray(picture))
+    assert (pixels[0] != pixels[1]).any()
+    np.testing.assert_array_equal(pixels[1], pixels[2])
+
+
+def test_figures_are_found_by_number():
+    assert [figure.number for figure in find_figures(["6.9", "6.1", "6.9"])] == ["6.9", "6.1"]
+    assert find_figures(["all"]) == list(FIGURES.values())
+    with pytest.raises(
+        RebodyError, match=r"no figure '6\.99'\. Did you mean 6\.9\? Figures are: 6\.1, 6\.2, .*, or all"
+    ):
+        find_figures(["6.1", "6.99"])
+
+
+@pytest.fixture
+def figure():
+    """A figure out of synthetic logs, which says where it took them from."""
+    told = []
+
+    def rerun(runs):
+        told.append(runs)
+        return episodes_of(1, targets=(1.0, 2.0))
+
+    made = replace(FIGURES["6.3"], shipped=lambda: SYNTHETIC["6.3"], rerun=rerun)
+    return made, told
+
+
+def test_a_figure_is_made_from_what_ships(figure, tmp_path):
+    made, told = figure
+    path = make_figure(made, tmp_path / "new", rerun=False)
+    assert_drawn(path)
+    assert list((tmp_path / "new").iterdir()) == [path]
+    assert not told
+
+
+def test_a_rerun_leaves_its_log(figure, tmp_path):
+    made, told = figure
+    assert_drawn(make_figure(made, tmp_path, rerun=True))
+    assert told == [tmp_path / "runs"]
+    log = safetensors.numpy.load_file(tmp_path / "6.3.safetensors")
+    np.testing.assert_array_equal(log["target"], [1.0, 2.0])
+    made.draw(log, tmp_path / "again.png", CAPTION)
+    assert_drawn(tmp_path / "again.png")
+
+
+@pytest.mark.parametrize("rerun", [False, True])
+def test_the_caption_says_how_it_was_made(figure, tmp_path, rerun):
+    captions = []
+    made = replace(figure[0], draw=lambda log, path, text: captions.append(text))
+    make_figure(made, tmp_path, rerun=rerun)
+    command, source = ("rebody figure 6.3 --rerun", "anew") if rerun else ("rebody figure 6.3", "the log that ships")
+    assert captions[0].startswith(made.caption)
+    assert f"`{command}`" in captions[0]
+    assert source in captions[0]
+
+
+def test_a_log_that_does_not_ship_is_one_message(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(data, "LOGS", tmp_path / "none")
+    assert run(["figure", "6.3", "--out", str(tmp_path / "out")]) == 2
+    complaint = capsys.readouterr().err
+    assert complaint.startswith("error: ")
+    assert "6.3.safetensors" in complaint
+    assert "Traceback" not in complaint
+
+
+def test_logs_are_joined_and_split_and_saved(tmp_path):
+    save(join({"a": episodes_of(1), "b": episodes_of(2)}), tmp_path / "log.safetensors")
+    log = safetensors.numpy.load_file(tmp_path / "log.safetensors")
+    for part, latent in (("a", 1), ("b", 2)):
+        for name, array in episodes_of(latent).items():
+            np.testing.assert_array_equal(split(log, part)[name].squeeze(), array.squeeze())
+    assert split(log, "a").keys() == episodes_of(1).keys()
+
+
+@pytest.mark.parametrize(
+    ("kind", "per_iteration", "measured"),
+    [("inference", 8 * 24, "return"), ("tracker", 4 * 4, "critic_loss"), ("flat", 4 * 4, "task_reward")],
+)
+def test_training_curves_come_out_of_the_artifact(trained, kind, per_iteration, measured):
+    log = training_log(trained[kind], kind)
+    np.testing.assert_array_equal(log["steps"], per_iteration * np.arange(1, 10))
+    assert np.isfinite(log[measured]).all()
+    assert {len(column) for column in log.values()} == {9}
+    if kind == "inference":
+        np.testing.assert_array_equal(np.isnan(log["critic_loss"]), [True] + [False] * 8)
+
+
+@pytest.mark.parametrize(
+    ("changes", "decision_s"),
+    [({}, 0.1), ({"thesis": True, "stride": 3}, 0.15), ({"robot": None, "tracker": None, "flat": None}, 0.1)],
+)
+def test_trajectories_are_those_of_the_trial(trial, changes, decision_s):
+    log = trajectories(replace(trial, **changes), np.array([-3.0, 2.0]))
+    np.testing.assert_allclose(log["time_s"], 0.1 * np.arange(1, 31))
+    assert log["position_m"].shape == (30, 2)
+    assert log["latent"].shape == (30, 2, 2)
+    np.testing.assert_array_equal(log["target"], [-3.0, 2.0])
+    assert float(log["decision_s"]) == pytest.approx(decision_s)
+    assert np.abs(log["position_m"][-1]).min() > 1e-3
+
+
+def test_long_trajectories_are_thinned_out(trial, monkeypatch):
+    target = np.array([2.0])
+    whole = trajectories(trial, target)
+    monkeypatch.setattr(data, "POINTS", 12)
+    thin = trajectories(trial, target)
+    np.testing.assert_allclose(thin["time_s"], [0.3, 0.6, 0.9, 1.2, 1.5, 1.8, 2.1, 2.4, 2.7, 3.0])
+    np.testing.assert_array_equal(thin["position_m"], whole["position_m"][2::3])
+    np.testing.assert_array_equal(thin["latent"], whole["latent"][2::3])
+
+
+def test_every_figure_has_a_number_that_the_list_shows(capsys):
+    assert run(["list"]) == 0
+    listed = capsys.readouterr().out
+    for number, figure in FIGURES.items():
+        assert figure.number == number
+        assert number in listed
