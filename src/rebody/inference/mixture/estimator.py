@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from rebody.errors import RebodyError
-from rebody.inference.mixture.fit import Fit, begin, begin_from
+from rebody.inference.mixture.fit import Fit, Known, begin, begin_from
 from rebody.inference.mixture.gaussians import DiagonalGaussians, FullGaussians
 from rebody.inference.mixture.laps import Lap, run
 from rebody.inference.mixture.model import Model, Parameters
@@ -72,6 +72,12 @@ class DirichletProcessMixture:
         X = _checked(X, self._model.gaussians.dimensions)
         rng = np.random.default_rng((self.random_state, self.known.next_id, len(X)))
         return self._finish(*self._run(begin_from(self._model, self._shuffled(X, rng), self.known), rng))
+
+    def warm_start(self, known: Known, offset: Float[np.ndarray, " D"]) -> "DirichletProcessMixture":
+        """Take over what an earlier mixture knew (`known`, and its prior mean); `partial_fit` goes on from there."""
+        kind = FullGaussians if self.covariance_type == "full" else DiagonalGaussians
+        self._model, self.known = Model(kind(self.prior_scale, offset), self.concentration), known
+        return self
 
     def predict_proba(self, X: Float[np.ndarray, "N D"]) -> Float[np.ndarray, "N K"]:
         """Responsibilities of the components for each point."""

@@ -5,9 +5,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from rebody.inference.mixture.estimator import DirichletProcessMixture
+from rebody.inference.mixture.fit import Known
+from rebody.inference.mixture.gaussians import Posterior
+from rebody.inference.mixture.model import Parameters
 from rebody.inference.prior import unit_gaussian
 from rebody.types import AnyArray, Belief
 
@@ -55,6 +58,47 @@ class MixturePrior(eqx.Module):
         return jnp.sum(jnp.einsum("kij,...kj->...ki", self.root, apart) ** 2, axis=-1)
 
 
+class Clusters(eqx.Module):
+    """A mixture in arrays of fixed sizes: what a checkpoint holds, and what the next fit begins with."""
+
+    prior: MixturePrior
+    ids: Int[AnyArray, " K"]
+    next_id: Int[AnyArray, ""]
+    offset: Float[AnyArray, " D"]  # the prior mean
+
+
+def no_clusters(maximum: int, dimensions: int) -> Clusters:
+    """Nothing fitted yet."""
+    prior = no_mixture(maximum, dimensions)
+    return Clusters(prior, np.full(maximum, -1), np.zeros((), int), np.zeros(dimensions))
+
+
+def remember(mixture: DirichletProcessMixture, maximum: int) -> Clusters:
+    """The largest components of a fitted mixture, at most `maximum`."""
+    model, _ = mixture.fitted
+    kept = _largest(mixture, maximum)
+    ids = np.full(maximum, -1)
+    ids[: len(kept)] = mixture.known.ids[kept]
+    return Clusters(mixture_prior(mixture, maximum), ids, np.array(mixture.known.next_id), model.gaussians.offset)
+
+
+def recall(clusters: Clusters, mixture: DirichletProcessMixture) -> DirichletProcessMixture:
+    """The given mixture with what was remembered, if there is anything."""
+    prior = jax.tree.map(np.asarray, clusters.prior)
+    active = prior.active
+    if not active.any():
+        return mixture
+    root = np.linalg.inv(prior.root[active])
+    scale = root @ np.swapaxes(root, -1, -2)
+    if mixture.covariance_type == "diag":
+        root, scale = np.einsum("kii->ki", root), np.einsum("kii->ki", scale)
+    posterior = Posterior(prior.nu[active], prior.kappa[active], prior.mean[active], scale, root)
+    parameters = Parameters(prior.log_weight[active], posterior)
+    return mixture.warm_start(
+        Known(parameters, np.asarray(clusters.ids)[active], int(clusters.next_id)), np.asarray(clusters.offset)
+    )
+
+
 def no_mixture(maximum: int, dimensions: int) -> MixturePrior:
     """Padding only."""
     one = np.ones(maximum)
@@ -75,7 +119,7 @@ def mixture_prior(mixture: DirichletProcessMixture, maximum: int) -> MixturePrio
     """The largest components of a fitted mixture, at most `maximum`."""
     model, parameters = mixture.fitted
     gaussians, components = model.gaussians, parameters.components
-    kept = np.argsort(-components.nu, kind="stable")[:maximum]
+    kept = _largest(mixture, maximum)
     covariances = gaussians.covariances(components)[kept]
     root, log_det = [], []
     for covariance, factor in zip(covariances, components.root[kept], strict=True):
@@ -97,3 +141,8 @@ def mixture_prior(mixture: DirichletProcessMixture, maximum: int) -> MixturePrio
     for name, values in fitted.items():
         getattr(padded, name)[: len(kept)] = values
     return padded
+
+
+def _largest(mixture: DirichletProcessMixture, maximum: int) -> Int[np.ndarray, " K"]:
+    _, parameters = mixture.fitted
+    return np.argsort(-parameters.components.nu, kind="stable")[:maximum]

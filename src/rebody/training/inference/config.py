@@ -10,6 +10,28 @@ from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
 
 
 @dataclass(frozen=True)
+class MixtureConfig:
+    """The mixture that clusters the latent (thesis 5.3.2), refitted from a warm start in every iteration."""
+
+    covariance_type: Literal["full", "diag"] = "full"
+    """Whether components may lie aslant."""
+    concentration: float = 5.0
+    """gamma of v_k ~ Beta(1, gamma)."""
+    prior_scale: float = 0.1
+    """Variance that the prior expects of a component in each dimension."""
+    components: int | None = None
+    """A fixed number of components, for comparison; by default it is found."""
+    points: int = 2000
+    """Beliefs of a fit."""
+    from_decision: int = 10
+    """Beliefs are taken from this decision of an episode on, when something is known."""
+    from_iteration: int = 5
+    """First iteration with a fit; before it the prior is N(0, I)."""
+    maximum: int = 32
+    """Components that the loss can take."""
+
+
+@dataclass(frozen=True)
 class MetaConfig:
     """What is learned, on which tasks, and for how long."""
 
@@ -25,6 +47,10 @@ class MetaConfig:
     """Fields of the global state that the policies see."""
     policy_scales: tuple[float, ...]
     """What each of them is divided by [m, m/s]."""
+    prior: Literal["gaussian", "mixture"] = "gaussian"
+    """What the latent is drawn towards: one Gaussian, or a Dirichlet process mixture."""
+    mixture: MixtureConfig = field(default_factory=MixtureConfig)
+    """Settings of the mixture."""
     toy: Literal["mass-damper", "position"] = "mass-damper"
     """The body that everything is learned on."""
     arrival: float = 0.0

@@ -10,6 +10,7 @@ from pathlib import Path
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
@@ -19,9 +20,11 @@ from rebody.control import sac
 from rebody.control.high_level import HighLevelPolicy, policy_observation
 from rebody.control.sac import SACBatch, SACState
 from rebody.errors import RebodyError
+from rebody.inference.mixture.padded import Clusters, no_clusters
 from rebody.inference.module import Evidence, InferenceModule, loss
-from rebody.inference.prior import unit_gaussian
+from rebody.inference.prior import Prior, unit_gaussian
 from rebody.inference.probe import Probe
+from rebody.training.inference.clusters import refit
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, collect, refresh_beliefs, roles
 from rebody.training.inference.report import measure, save_inference
@@ -40,6 +43,7 @@ class RunState(eqx.Module):
     optimiser: optax.OptState
     sac: SACState  # the high-level policy
     told: SACState  # the same policy, told the task: the toy's oracle
+    clusters: Clusters
     replay: Episodes  # [group, episode, time]
     iteration: Int[Array, ""]
 
@@ -69,20 +73,28 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
     iteration = int(state.iteration)
     keys = jax.random.split(jax.random.fold_in(key, iteration), 3)
     module, optimiser, policy, told = state.module, state.optimiser, state.sac, state.told
+    clusters = state.clusters
 
     acting = roles(config.episodes, all_wander=iteration < config.wander_iterations)
     episodes = collect(module.encoder, policy.actor, toy, config, acting, keys[0])
     metrics = {"return": episodes.reward[acting.decides].sum(-1).mean()}
     replay, stored = store(state.replay, episodes, state.iteration)
     if iteration < config.inference_iterations:
-        module, optimiser, inference_metrics = update_inference(module, optimiser, replay, stored, config, keys[1])
+        prior = clusters.prior if config.prior == "mixture" else unit_gaussian
+        module, optimiser, inference_metrics = update_inference(
+            module, optimiser, replay, stored, prior, config, keys[1]
+        )
         metrics |= inference_metrics
         replay = refresh_beliefs(module.encoder, replay)
+        if config.prior == "mixture" and iteration >= config.mixture.from_iteration:
+            rng = np.random.default_rng(np.asarray(jax.random.key_data(keys[1])))
+            clusters, cluster_metrics = refit(clusters, replay, int(stored), config, rng)
+            metrics |= cluster_metrics
     if iteration >= config.wander_iterations:
         policy, policy_metrics = update_policy(policy, replay, stored, config, keys[2])
         told, told_metrics = update_policy(told, tell(replay, config), stored, config, keys[2])
         metrics |= policy_metrics | {f"told/{name}": value for name, value in told_metrics.items()}
-    state = RunState(module, optimiser, policy, told, replay, state.iteration + 1)
+    state = RunState(module, optimiser, policy, told, clusters, replay, state.iteration + 1)
     if (iteration + 1) % EVALUATE_EVERY == 0:
         figures = measure(trained_parts(state, config), toy, config)
         metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
@@ -109,6 +121,7 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
         optimiser=_optimiser(config).init(eqx.filter(module, eqx.is_array)),
         sac=policy,
         told=told,
+        clusters=no_clusters(config.mixture.maximum, config.inference.latent),
         replay=jax.tree.map(lambda leaf: jnp.zeros((config.groups, *leaf.shape), leaf.dtype), one_group),
         iteration=jnp.zeros((), jnp.int32),
     )
@@ -141,7 +154,13 @@ def store(replay: Episodes, episodes: Episodes, iteration: Int[Array, ""]):
 
 @eqx.filter_jit
 def update_inference(
-    module: InferenceModule, optimiser: optax.OptState, replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray
+    module: InferenceModule,
+    optimiser: optax.OptState,
+    replay: Episodes,
+    stored,
+    prior: Prior,
+    config: MetaConfig,
+    key: PRNGKeyArray,
 ) -> tuple[InferenceModule, optax.OptState, dict[str, Float[Array, ""]]]:
     """Steps of encoder and decoder on windows of stored episodes."""
     arrays, static = eqx.partition(module, eqx.is_array)
@@ -151,7 +170,7 @@ def update_inference(
         sample_key, loss_key = jax.random.split(key)
         evidence = sample_evidence(replay, stored, config, sample_key)
         gradient, metrics = jax.grad(
-            lambda a: loss(eqx.combine(a, static), evidence, unit_gaussian, config.inference, loss_key),
+            lambda a: loss(eqx.combine(a, static), evidence, prior, config.inference, loss_key),
             has_aux=True,
         )(arrays)
         updates, optimiser = _optimiser(config).update(gradient, optimiser)
