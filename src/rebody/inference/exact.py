@@ -32,7 +32,8 @@ class ExactPosterior(eqx.Module):
 
     def prior(self, shape: tuple[int, ...] = ()) -> Belief:
         """The belief before anything is seen."""
-        return self.belief(self.initial(shape))
+        one = self.belief(self.initial())
+        return jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (*shape, *leaf.shape)), one)
 
     def step(
         self, memory: Float[AnyArray, "*batch point"], transition: Transition

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from rebody.inference.mixture.fit import Fit
+from rebody.inference.mixture.fit import Fit, Known
 from rebody.inference.mixture.moves import birth, delete, merge
 
 MAX_LAPS = 500
@@ -26,6 +26,7 @@ class Lap:
     births: int
     merges: int
     deletes: int
+    known: Known
 
 
 class Trials:
@@ -57,7 +58,7 @@ def run(fit: Fit, rng: np.random.Generator, *, moves: bool = True) -> tuple[Fit,
         merged = merge(fit) if moves else 0
         born, tried = _births(fit, births, rng) if moves else (0, False)
         deleted = _delete(fit, deletes) if moves and not born else 0
-        history.append(Lap(fit.bound, fit.k, born, merged, deleted))
+        history.append(Lap(fit.bound, fit.k, born, merged, deleted, fit.known))
         settled = fit.bound - before <= TOLERANCE * abs(fit.bound)
         if settled and not tried and not (merged or born or deleted):
             break

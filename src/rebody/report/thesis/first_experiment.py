@@ -40,7 +40,7 @@ STRIDES = (10, 50, 100)
 def toy_picture(_: Path) -> Data:
     """The toy as MuJoCo draws it."""
     model = mass_damper_model(MassDamper())
-    camera = Camera(model, 640, 480)
+    camera = Camera(model, 480, 360)
     try:
         return {"picture": np.asarray(camera.picture(np.zeros(model.nq)))}
     finally:
