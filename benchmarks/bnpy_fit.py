@@ -3,8 +3,7 @@
     PYTHON benchmarks/bnpy_fit.py INPUT.npz OUTPUT.npz
 
 INPUT: points `X` [N, D], `covariance_type`, the bound to reach `target` [nats], `limit` [s], `concentration`,
-`prior_scale`, `batches`. OUTPUT: responsibilities `r` [N, K], `seconds`, and `bound`, bnpy's own ELBO [nats; its loss is
-that per number].
+`prior_scale`, `batches`. OUTPUT: responsibilities `r` [N, K], `seconds`, and `bound`, bnpy's own ELBO [nats].
 """
 
 import inspect
@@ -34,13 +33,13 @@ class Watch:
         self.target, self.limit, self.scale, self.begun = target, limit, scale, time.perf_counter()
         self.bound, self.model, self.seconds = -np.inf, None, 0.0
 
-    def onBatchComplete(self, **state):  # noqa: N802
+    def onBatchComplete(self, **state):
         if time.perf_counter() - self.begun > self.limit:
             raise Done
 
-    def onLapComplete(self, hmodel=None, loss=None, lapFrac=0.0, **state):  # noqa: N802, N803
+    def onLapComplete(self, hmodel=None, loss=None, lapFrac=0.0, **state):
         self.seconds = time.perf_counter() - self.begun
-        # until every batch has been seen once the loss is that of a part
+        # its loss is per number in the data; until every batch has been seen it is that of a part
         bound = -float(loss) * self.scale if lapFrac >= 1 else -np.inf
         if bound > self.bound:
             self.bound, self.model = bound, hmodel.copy()

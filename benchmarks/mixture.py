@@ -41,6 +41,8 @@ from rebody.inference.mixture.gaussians import KAPPA0
 from rebody.inference.mixture.model import Model, Responsibilities
 
 SHARES = (0.30, 0.22, 0.18, 0.14, 0.10, 0.05, 0.01)
+APART = 4.0
+"""Between centres; a cluster's standard deviations are 0.3 to 1."""
 CONCENTRATION, PRIOR_SCALE = 5.0, 0.1
 TRUNCATION = 20
 PATIENCE = 1e-7
@@ -76,19 +78,29 @@ def main() -> None:
 
 
 def points(n: int, dimensions: int, covariance: str) -> np.ndarray:
-    """Clusters of the shares above, each with its own covariance, centred, in no order."""
+    """Clusters of the shares above, apart from one another, each with its own covariance; centred, in no order."""
     rng = np.random.default_rng(dimensions)
     counts = np.round(n * np.array(SHARES)).astype(int)
     counts[0] += n - counts.sum()
     clusters = []
-    for count in counts:
-        turn = (
-            np.linalg.qr(rng.normal(size=(dimensions, dimensions)))[0] if covariance == "full" else np.eye(dimensions)
-        )
+    for count, centre in zip(counts, centres(rng, len(SHARES), dimensions), strict=True):
+        turn = np.eye(dimensions)
+        if covariance == "full":
+            turn = np.linalg.qr(rng.normal(size=(dimensions, dimensions)))[0]
         widths = rng.uniform(0.3, 1.0, dimensions)
-        clusters.append(rng.normal(0.0, 4.0, dimensions) + (rng.normal(size=(count, dimensions)) * widths) @ turn.T)
+        clusters.append(centre + (rng.normal(size=(count, dimensions)) * widths) @ turn.T)
     x = rng.permutation(np.concatenate(clusters))
     return x - x.mean(0)
+
+
+def centres(rng: np.random.Generator, k: int, dimensions: int) -> np.ndarray:
+    """At least `APART` from one another."""
+    found: list[np.ndarray] = []
+    while len(found) < k:
+        proposed = rng.normal(0.0, 4.0, dimensions)
+        if all(np.linalg.norm(proposed - other) > APART for other in found):
+            found.append(proposed)
+    return np.array(found)
 
 
 def compare(covariance: str, options: argparse.Namespace) -> None:

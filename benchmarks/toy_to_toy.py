@@ -71,15 +71,15 @@ def plot(measured: dict, path: Path) -> None:
                 errors.plot(FACTORS, error, "o-", label=label)
                 regrets.plot(FACTORS, regret, "o-", label=label)
         nominal_error, nominal_regret = measured["position", "mass", 1.0]
-        errors.axhline(1.25 * nominal_error, color=BELIEF, ls="--", lw=1)
-        regrets.axhline(nominal_regret + 0.1, color=MOTION, ls="--", lw=1)
-        errors.set(yscale="log", ylabel="median final error [m] (line: 125 % of the training toy's)")
-        regrets.set(ylabel="regret (line: 0.1 above the training toy's)")
+        errors.axhline(1.25 * nominal_error, color=BELIEF, ls="--", lw=1, label="125 % of the training toy's")
+        regrets.axhline(nominal_regret + 0.1, color=MOTION, ls="--", lw=1, label="0.1 above the training toy's")
+        errors.set(yscale="log", ylabel="median final error [m]")
+        regrets.set(ylabel="regret")
         for axes in (errors, regrets):
             axes.set(xscale="log", xlabel="factor")
             axes.set_xticks(FACTORS, [f"{factor:g}" for factor in FACTORS])
             axes.minorticks_off()
-        regrets.legend(frameon=False, fontsize=8)
+            axes.legend(frameon=False, fontsize=7)
 
 
 if __name__ == "__main__":

@@ -35,8 +35,8 @@ FIGURES = {
             first.shipped("6.1"),
             first.toy_picture,
             first.draw_toy,
-            "Left: the mass-damper toy as MuJoCo draws it. Right: what acts on it. The action is the share of the "
-            "largest force; gravity is carried by the floor; terminal speed 3.5 m/s.",
+            "Left: the mass-damper toy as MuJoCo draws it. Right: what acts on it. The action is the share of the"
+            " largest force; gravity is carried by the floor; terminal speed 3.5 m/s.",
         ),
         ThesisFigure(
             "6.2",
@@ -44,9 +44,9 @@ FIGURES = {
             first.toy_training_log,
             first.train_toy,
             first.draw_toy_training,
-            "Return over 20 s while `position-thesis` learns: of episodes that act by their mean action, and of 200 "
-            "held-out goals; the oracle is the same learner, told the goal. Until the first joint iteration all toys "
-            "wander, and only the inference module learns.",
+            "Return over 20 s while `position-thesis` learns: of episodes that act by their mean action, and of "
+            "200 held-out goals; the oracle is the same learner, told the goal. Until the first joint iteration "
+            "all toys wander, and only the inference module learns.",
         ),
         ThesisFigure(
             "6.3",
@@ -54,8 +54,9 @@ FIGURES = {
             first.shipped("6.3"),
             lambda _: first.on_toy(),
             first.draw_episodes,
-            "12 hidden goals in [0, 10] m on the position toy (steps of at most 0.1 m). Left: the way (dots: goals) "
-            "and the one-dimensional latent. Right: the latent over the goal, every decision of the second half.",
+            "12 hidden goals in [0, 10] m on the position toy (steps of at most 0.1 m). Left: the way (dots: "
+            "goals) and the one-dimensional latent. Right: the latent over the goal, every decision of the second"
+            " half.",
         ),
         ThesisFigure(
             "6.5",
@@ -63,8 +64,10 @@ FIGURES = {
             first.shipped("6.5"),
             lambda _: first.flat_on_cheetah(),
             first.draw_episodes,
-            "The frozen module `position` on the cheetah with a policy that has no hierarchy in it (`flat-cheetah`): "
-            "12 hidden goals in +-10 m.",
+            "The frozen module `position` on the cheetah with a policy that has no hierarchy in it (`flat-"
+            "cheetah`): 12 hidden goals in +-10 m. It reaches them, but for the robot that stops halfway to -10 m"
+            " and then takes it for a nearer one: a window of standing still says how far a goal is, not on which"
+            " side.",
         ),
         ThesisFigure(
             "6.6",
@@ -72,8 +75,8 @@ FIGURES = {
             first.flat_training_log,
             first.train_flat_again,
             first.draw_flat_training,
-            "Learning `flat-cheetah`. Left: the task's reward per decision while it explores. Right: final error on "
-            "100 held-out goals in +-10 m.",
+            "Learning `flat-cheetah`. Left: the task's reward per decision while it explores, mean of two "
+            "episodes. Right: final error on 100 held-out goals in +-10 m.",
         ),
         ThesisFigure(
             "6.7",
@@ -81,8 +84,8 @@ FIGURES = {
             first.tracker_training_log,
             first.train_tracker_again,
             first.draw_tracker_training,
-            "Learning `tracker-cheetah`: errors on 100 held-out goals within 5 m (left) and 100 held-out speeds of "
-            "+-[1, 3] m/s (right), told to the tracker, at every 50th iteration.",
+            "Learning `tracker-cheetah`: errors on 100 held-out goals within 5 m (left) and 100 held-out speeds "
+            "of +-[1, 3] m/s (right), told to the tracker, at every 50th iteration.",
         ),
         ThesisFigure(
             "6.8",
@@ -90,7 +93,9 @@ FIGURES = {
             first.shipped("6.8"),
             lambda _: first.thesis_on_cheetah(1),
             first.draw_transfer,
-            "`position-thesis`, frozen, on the cheetah in thesis mode with stride 1: 12 hidden goals in [0, 10] m.",
+            "`position-thesis`, frozen, on the cheetah in thesis mode with stride 1: 12 hidden goals in [0, 10] "
+            "m. A control step takes the robot less far than a step takes the toy; it arrives late, some sway "
+            "about the goal, and the latents are noisier than on the toy (figure 6.3).",
         ),
         ThesisFigure(
             "6.9",
@@ -98,8 +103,10 @@ FIGURES = {
             first.shipped("6.9"),
             lambda _: first.strides_on_cheetah(),
             first.draw_strides,
-            "The same with strides of 10, 50 and 100 control steps (0.5, 2.5 and 5 s), and beside them our mode: "
-            "`position`, a decision every 0.1 s, the toy imagined 15 decisions ahead.",
+            "`position-thesis`, frozen, on the cheetah in thesis mode with strides of 10, 50 and 100 control "
+            "steps (0.5, 2.5 and 5 s): counted in decisions all do as the toy does, in seconds a longer stride is"
+            " slower by as much. Right: our mode, `position` with a decision every 0.1 s and the toy imagined 15 "
+            "decisions ahead.",
         ),
     )
 }
