@@ -113,6 +113,7 @@ FLAGS = {
         --wander-iterations 1 --joint-iterations 2 --policy-iterations 6 --inference-updates 2 --policy-updates 2
         --inference.units 8 --inference.window 4 --inference.batch-size 4 --inference.decoded 2
         --sac.hidden 8 8 --sac.projections 2 --sac.batch-size 8
+        --prior mixture --mixture.from-iteration 1 --mixture.points 60
     """,
     "flat": """
         train flat --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5

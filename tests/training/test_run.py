@@ -121,6 +121,7 @@ def test_a_file_is_no_folder_for_a_run(pipeline, tmp_path, capsys):
         (["--seed", "1"], "(seed)"),
         (["--sac.discount", "0.5", "--seed", "1"], "(sac, seed)"),
         (["--init-from", "{run}"], "(init_from)"),
+        (["--sac.hidden", "8", "9"], "(sac)"),
     ],
 )
 def test_other_settings_are_not_resumed(pipeline, tmp_path, changes, named, capsys):
@@ -134,13 +135,14 @@ def test_other_settings_are_not_resumed(pipeline, tmp_path, changes, named, caps
     assert pipeline.end(out) == before
 
 
-def test_networks_of_other_sizes_are_not_resumed(pipeline, tmp_path, capsys):
-    out = tmp_path / "run"
+def test_a_run_killed_while_its_artifact_was_saved_is_found_again(pipelines, tmp_path, measured_in_short):
+    pipeline, out = pipelines["tracker"], tmp_path / "run"
     assert pipeline(out) == 0
     before = pipeline.end(out)
-    assert pipeline(out, "--resume", "--sac.hidden", "8", "9") == 2
-    assert "does not fit what is built here" in capsys.readouterr().err
+    out.rename(tmp_path / ".run.old")
+    assert pipeline(out, "--resume") == 0
     assert pipeline.end(out) == before
+    assert list(tmp_path.iterdir()) == [out]
 
 
 def untrained(pipeline):

@@ -1,6 +1,6 @@
 """Files that last: artifacts (trained parts, shared) and checkpoints (runs, continued)."""
 
-from rebody.store.artifact import Artifact, load_artifact, save_artifact, shipped_artifacts
+from rebody.store.artifact import Artifact, load_artifact, recover, save_artifact, shipped_artifacts
 from rebody.store.checkpoint import load_checkpoint, save_checkpoint
 from rebody.store.trees import arrays_into_tree, tree_hash, tree_to_arrays
 
@@ -9,6 +9,7 @@ __all__ = [
     "arrays_into_tree",
     "load_artifact",
     "load_checkpoint",
+    "recover",
     "save_artifact",
     "save_checkpoint",
     "shipped_artifacts",

@@ -92,6 +92,12 @@ def load_artifact(reference: str | Path, kind: str) -> Artifact:
     )
 
 
+def recover(path: Path) -> None:
+    """Put a folder back in its place that a save was about to replace when it was killed."""
+    if not path.exists() and _backup(path).is_dir():
+        _backup(path).rename(path)
+
+
 def shipped_artifacts() -> list[tuple[str, str]]:
     """(name, kind) of every artifact inside the package, in the order of their names."""
     folders = sorted(manifest.parent for manifest in SHIPPED.glob(f"*/{MANIFEST}"))

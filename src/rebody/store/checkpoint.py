@@ -7,6 +7,7 @@ A hash over meta data and arrays lies in its header: a flipped byte often loads 
 import hashlib
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +42,12 @@ def save_checkpoint(folder: Path, state: Any, meta: dict[str, Any]) -> None:
     sync(folder)
 
 
-def load_checkpoint(folder: Path, template: Tree) -> tuple[Tree, dict[str, Any]] | None:
+def load_checkpoint(
+    folder: Path, template: Tree, check: Callable[[dict[str, Any]], None] = lambda meta: None
+) -> tuple[Tree, dict[str, Any]] | None:
     """The saved (state, meta), the state shaped like `template`; None if the folder has no checkpoint.
+
+    `check` sees the meta data first: it can say more plainly than shapes why something does not fit.
 
     Raises:
         RebodyError: it is damaged, of another format version, or does not fit the template.
@@ -59,7 +64,9 @@ def load_checkpoint(folder: Path, template: Tree) -> tuple[Tree, dict[str, Any]]
     meta_json = header.get("meta", "")
     if header.get("sha256") != _sha256(arrays, meta_json):
         raise _damaged(path)
-    return arrays_into_tree(template, arrays, f"checkpoint {path}"), json.loads(meta_json)
+    meta = json.loads(meta_json)
+    check(meta)
+    return arrays_into_tree(template, arrays, f"checkpoint {path}"), meta
 
 
 def _sha256(arrays: dict[str, np.ndarray], meta_json: str) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 from tensorboardX import SummaryWriter
 
 from rebody.errors import RebodyError
-from rebody.store import load_checkpoint, save_checkpoint, tree_to_arrays
+from rebody.store import load_checkpoint, recover, save_checkpoint, tree_to_arrays
 from rebody.training.progress import Metrics, progress
 
 SHOWN_FAULTS = 5
@@ -51,6 +51,7 @@ class Run:
         """Seconds of training so far, over all resumptions."""
         self.history: list[Metrics] = []
         """What every iteration measured."""
+        recover(out)
         if out.exists() and not out.is_dir():
             raise RebodyError(f"{out} is a file; a run needs a folder. Choose another --out.")
         if not resume and ((out / "checkpoint").exists() or (out / "manifest.json").exists()):
@@ -58,10 +59,14 @@ class Run:
 
     def restore(self, state: State) -> State:
         """The checkpointed state if this run is resumed and has one, else the given fresh one."""
-        found = load_checkpoint(self._checkpoint, state) if self.resume else None
+        found = load_checkpoint(self._checkpoint, state, self._check_settings) if self.resume else None
         if found is None:
             return state
         state, meta = found
+        self.wall_s, self.history = meta["wall_s"], meta["history"]
+        return state
+
+    def _check_settings(self, meta: dict[str, Any]) -> None:
         if meta["settings"] != self.settings:
             changed = sorted(
                 name
@@ -72,8 +77,6 @@ class Run:
                 f"cannot resume {self.out}: it was begun with other settings ({', '.join(changed)}). "
                 "Use the same ones, or choose another --out."
             )
-        self.wall_s, self.history = meta["wall_s"], meta["history"]
-        return state
 
     @property
     def log(self) -> str:

@@ -1,16 +1,19 @@
 """The mixture as users see it: streams, what it refuses, and what it promises."""
 
-import jaxtyping
+import copy
+
 import numpy as np
 import pytest
 
 from rebody.errors import RebodyError
 from rebody.inference.mixture import DirichletProcessMixture
 
+pytestmark = pytest.mark.usefixtures("as_users_call")
+
 CENTRES = {"a": [0.0, 0.0], "b": [8.0, 0.0], "c": [0.0, 8.0], "d": [8.0, 8.0], "e": [-8.0, 0.0]}
 
 
-def around(names, rng, n=150):
+def around(names, rng, n=70):
     """Points of width 0.5 about these centres."""
     return np.concatenate([rng.normal(0.0, 0.5, (n, 2)) + CENTRES[name] for name in names])
 
@@ -21,40 +24,37 @@ def ids_at(mixture, names):
     return dict(zip(names, found.tolist(), strict=True))
 
 
-@pytest.fixture
-def three():
-    """Three clusters of unlike sizes, and a fit to them."""
+@pytest.fixture(scope="module")
+def three_once():
     rng = np.random.default_rng(0)
     x = rng.permutation(np.concatenate([around("a", rng, 200), around("b", rng, 120), around("c", rng, 30)]))
     return x, DirichletProcessMixture(random_state=0).fit(x)
 
 
 @pytest.fixture
-def as_users_call():
-    """Without the shape checks that only tests have."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
+def three(three_once):
+    """Three clusters of unlike sizes, and a fit to them."""
+    return copy.deepcopy(three_once)
 
 
 # streams
 
 
-@pytest.mark.parametrize("covariance_type", ["full", "diag"])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("covariance_type", "seed"), [("full", 0), ("diag", 1)])
 def test_a_stream(covariance_type, seed):
     """Clusters that appear are born within 2 fits, vanished ones are gone within 3, the others stay who they are."""
     rng = np.random.default_rng(seed)
     mixture = DirichletProcessMixture(covariance_type, random_state=seed)
     known = {}
-    for names, fits in (("ab", 2), ("abc", 2), ("bc", 3), ("bcde", 2), ("de", 3), ("abde", 2)):
+    for names, fits in (("ab", 2), ("abc", 2), ("bc", 3), ("bcde", 2), ("ade", 3)):
         for _ in range(fits):
             mixture.partial_fit(around(names, rng))
         ids = ids_at(mixture, names)
         assert mixture.n_components_ == len(names)
         assert sorted(mixture.component_ids_.tolist()) == sorted(ids.values())
         assert len(set(ids.values())) == len(names)
-        assert {name: ids[name] for name in names if name in known} == {n: known[n] for n in names if n in known}
+        stayed = [name for name in names if name in known]
+        assert [ids[name] for name in stayed] == [known[name] for name in stayed]
         known = ids
 
 
@@ -152,9 +152,10 @@ def test_another_seed_same_optimum(three):
 def test_shifting_all_points_changes_nothing(three):
     """The prior mean goes with them."""
     x, mixture = three
-    shifted = DirichletProcessMixture(random_state=0).fit(x + [1e5, -1e5])
+    far = np.array([1e5, -1e5])
+    shifted = DirichletProcessMixture(random_state=0).fit(x + far)
     assert shifted.lower_bound_ == pytest.approx(mixture.lower_bound_, abs=1e-2)
-    assert shifted.means_ - [1e5, -1e5] == pytest.approx(mixture.means_, abs=1e-4)
+    assert shifted.means_ - far == pytest.approx(mixture.means_, abs=1e-4)
 
 
 def test_the_points_are_left_alone(three):
@@ -195,7 +196,6 @@ def test_points_that_are_not_finite_are_refused(three, bad):
             refuses(x)
 
 
-@pytest.mark.usefixtures("as_users_call")
 @pytest.mark.parametrize("shape", [(5,), (2, 3, 4), (0, 2), (4, 0), ()])
 def test_other_shapes_are_refused(shape):
     with pytest.raises(RebodyError, match=r"shape \[N, D\]"):
@@ -215,7 +215,6 @@ def test_predicting_before_a_fit_is_refused():
             refuses(np.zeros((4, 3)))
 
 
-@pytest.mark.usefixtures("as_users_call")
 def test_what_is_like_points_is_taken():
     """Lists, whole numbers, single precision."""
     rows = [[0, 1], [2, 3], [4, 4]]
@@ -223,7 +222,6 @@ def test_what_is_like_points_is_taken():
     assert bounds[0] == bounds[1] == bounds[2]
 
 
-@pytest.mark.usefixtures("as_users_call")
 @pytest.mark.parametrize(
     ("settings", "says"),
     [

@@ -42,6 +42,9 @@ class DirichletProcessMixture:
         for name, value in (("concentration", concentration), ("prior_scale", prior_scale), ("n_batches", n_batches)):
             if not (np.isfinite(value) and value > 0):
                 raise RebodyError(f"{name} must be positive, not {value}.")
+        for name, value in (("n_batches", n_batches), ("n_components", n_components)):
+            if value is not None and (value != int(value) or value < 1):
+                raise RebodyError(f"{name} must be a whole number of at least 1, not {value}.")
         self.covariance_type = covariance_type
         self.concentration = concentration
         self.prior_scale = prior_scale
@@ -77,6 +80,7 @@ class DirichletProcessMixture:
         """Take over what an earlier mixture knew (`known`, and its prior mean); `partial_fit` goes on from there."""
         kind = FullGaussians if self.covariance_type == "full" else DiagonalGaussians
         self._model, self.known = Model(kind(self.prior_scale, offset), self.concentration), known
+        self._order = np.argsort(-known.parameters.components.nu, kind="stable")
         return self
 
     def predict_proba(self, X: Float[np.ndarray, "N D"]) -> Float[np.ndarray, "N K"]:
@@ -100,7 +104,7 @@ class DirichletProcessMixture:
     def _run(self, start: Fit, rng: np.random.Generator) -> tuple[Fit, list[Lap]]:
         return run(start, rng, moves=self.n_components is None)
 
-    def _shuffled(self, X: Float[np.ndarray, "N D"], rng: np.random.Generator) -> list[Float[np.ndarray, "N D"]]:
+    def _shuffled(self, X: Float[np.ndarray, "N D"], rng: np.random.Generator) -> list[Float[np.ndarray, "_ D"]]:
         batches = np.array_split(rng.permutation(X), min(self.n_batches, len(X)))
         return [np.ascontiguousarray(batch) for batch in batches]
 

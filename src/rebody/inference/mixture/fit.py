@@ -30,7 +30,7 @@ class Fit:
     """A mixture on its way: batches, what each was last given, and who the components are."""
 
     model: Model
-    batches: list[Float[np.ndarray, "N D"]]
+    batches: list[Float[np.ndarray, "_ D"]]
     responsibilities: list[Responsibilities]
     statistics: Statistics  # [batch, K]
     ids: Int[np.ndarray, " K"]
@@ -68,7 +68,7 @@ class Fit:
             old[b] = new
         self.refresh()
 
-    def replace(self, columns: Int[np.ndarray, " K"], added: "list[Columns]", ids: Int[np.ndarray, " K"]) -> None:
+    def replace(self, columns: Int[np.ndarray, " kept"], added: "list[Columns]", ids: Int[np.ndarray, " K"]) -> None:
         """Keep some components, and put new ones behind them."""
         for b, responsibilities in enumerate(self.responsibilities):
             parts = [responsibilities.r[:, columns], *(c.r[b] for c in added)]
@@ -84,21 +84,18 @@ class Fit:
 class Columns:
     """Components of a proposal: responsibilities in each batch, and their statistics."""
 
-    r: list[Float[np.ndarray, "N J"]]
+    r: list[Float[np.ndarray, "_ J"]]
     statistics: Statistics  # [batch, J]
 
-    def __getitem__(self, j: Int[np.ndarray, " J"]) -> "Columns":
-        return Columns([r[:, j] for r in self.r], self.statistics[:, j])
 
-
-def begin(model: Model, batches: list[Float[np.ndarray, "N D"]], parts: list[Int[np.ndarray, " N"]]) -> Fit:
+def begin(model: Model, batches: list[Float[np.ndarray, "_ D"]], parts: list[Int[np.ndarray, " _"]]) -> Fit:
     """Components that hold their points for sure: those of part 0, of part 1, ..."""
     k = max(int(part.max()) for part in parts) + 1
     sure = [(part[:, None] == np.arange(k)).astype(float) for part in parts]
     return _fit(model, batches, [Responsibilities(r, np.zeros(k)) for r in sure], np.arange(k), k)
 
 
-def begin_from(model: Model, batches: list[Float[np.ndarray, "N D"]], known: Known) -> Fit:
+def begin_from(model: Model, batches: list[Float[np.ndarray, "_ D"]], known: Known) -> Fit:
     """A warm start: what was learned before gives every batch its first responsibilities."""
     responsibilities = [model.local_step(x, known.parameters) for x in batches]
     fit = _fit(model, batches, responsibilities, known.ids.copy(), known.next_id)

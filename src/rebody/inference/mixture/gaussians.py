@@ -5,6 +5,7 @@ Numbers of formulas are those of Bishop (2006), chapter 10.2; the thesis' 5.11 i
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
@@ -93,7 +94,7 @@ class Gaussians(ABC):
     @abstractmethod
     def _log_z(self, posterior: Posterior) -> Array: ...
 
-    @property
+    @cached_property
     def _log_z0(self) -> float:
         none = np.zeros(1)
         mean = np.zeros((1, self.dimensions))
@@ -124,7 +125,7 @@ class FullGaussians(Gaussians):
 
     def whiten(self, x, posterior, k):
         """L^-1 (x - m)."""
-        inverse = scipy.linalg.solve_triangular(posterior.root[k], np.eye(self.dimensions), lower=True)
+        inverse = scipy.linalg.lapack.dtrtri(posterior.root[k], lower=1)[0]  # pyright: ignore[reportAttributeAccessIssue]
         return (x - posterior.mean[k]) @ inverse.T
 
     def _scale(self, scatter, weight, apart):

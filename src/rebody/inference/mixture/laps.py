@@ -53,7 +53,7 @@ def run(fit: Fit, rng: np.random.Generator, *, moves: bool = True) -> tuple[Fit,
     history, births, deletes = [], Trials(), Trials()
     for _ in range(MAX_LAPS):
         before = fit.bound
-        for b in rng.permutation(len(fit.batches)):
+        for b in rng.permutation(len(fit.batches)).tolist():
             fit.visit(b)
         merged = merge(fit) if moves else 0
         born, tried = _births(fit, births, rng) if moves else (0, False)
@@ -68,7 +68,7 @@ def run(fit: Fit, rng: np.random.Generator, *, moves: bool = True) -> tuple[Fit,
 def _births(fit: Fit, trials: Trials, rng: np.random.Generator) -> tuple[int, bool]:
     """Try each component that may have parts, the largest first; returns how many had, and whether any was tried."""
     born = 0
-    todo = [i for i in fit.ids[np.argsort(-fit.total.count)] if trials.worthwhile(i, _count(fit, i))]
+    todo = [i for i in fit.ids[np.argsort(-fit.total.count)].tolist() if trials.worthwhile(i, _count(fit, i))]
     for identity in todo:
         k = int(np.flatnonzero(fit.ids == identity)[0])
         if birth(fit, k, rng):

@@ -48,15 +48,20 @@ def merge(fit: Fit) -> int:
 def _candidates(fit: Fit) -> list[tuple[int, int]]:
     """Pairs that could gain: entropy can only be lost by a merge, so the rest of the gain bounds it."""
     total, model = fit.total, fit.model
-    evidence, base = model.gaussians.evidence(total), model.allocation(total.count)
-    found = []
-    for a in range(fit.k):
-        for b in range(a + 1, fit.k):
-            together = _sum_pair(total, a, b)
-            gain = model.gaussians.evidence(together)[0] - evidence[a] - evidence[b]
-            if gain + _allocation_merged(model, total.count, a, b) - base > EPSILON:
-                found.append((a, b))
-    return found
+    base = model.allocation(total.count)
+    return [
+        (a, b)
+        for a, b, gain in zip(*_pair_gains(model, total), strict=True)
+        if gain + _allocation_merged(model, total.count, a, b) - base > EPSILON
+    ]
+
+
+def _pair_gains(model: Model, parts: Statistics) -> tuple[list[int], list[int], list[float]]:
+    """All pairs (a, b), and what the evidence gains if each is merged [nats]."""
+    a, b = np.triu_indices(len(parts.count), 1)
+    evidence = model.gaussians.evidence(parts)
+    together = model.gaussians.evidence(combine(parts[np.stack([a, b])]))
+    return a.tolist(), b.tolist(), (together - evidence[a] - evidence[b]).tolist()
 
 
 def _merge_gain(fit: Fit, a: int, b: int) -> float:
@@ -127,7 +132,7 @@ def _design(fit: Fit, k: int, rng: np.random.Generator) -> Statistics | None:
     for _ in range(REFINEMENTS):
         parts = parts[parts.count >= min(SMALLEST, 0.5 * parts.count.max())]
         r = _within(model, x, parts) * weight[:, None]
-        parts = model.summarise(x, Responsibilities(r, np.array([_entropy(r[:, [j]]) for j in range(r.shape[1])])))
+        parts = model.summarise(x, Responsibilities(r, scipy.special.entr(r).sum(0)))
     parts = _merge_greedily(model, parts[parts.count >= min(SMALLEST, 0.5 * parts.count.max())])
     return parts if len(parts.count) > 1 else None
 
@@ -171,14 +176,12 @@ def _within(model: Model, x: Float[np.ndarray, "N D"], parts: Statistics) -> Flo
 def _merge_greedily(model: Model, parts: Statistics) -> Statistics:
     """Merge the pair that gains most while the evidence gains."""
     while len(parts.count) > 1:
-        evidence = model.gaussians.evidence(parts)
-        pairs = [(a, b) for a in range(len(evidence)) for b in range(a + 1, len(evidence))]
-        gains = [model.gaussians.evidence(_sum_pair(parts, a, b))[0] - evidence[a] - evidence[b] for a, b in pairs]
+        a, b, gains = _pair_gains(model, parts)
         best = int(np.argmax(gains))
         if gains[best] <= 0:
             return parts
-        rest = np.delete(np.arange(len(evidence)), pairs[best])
-        parts = concatenate([parts[rest], _sum_pair(parts, *pairs[best])], 0)
+        rest = np.delete(np.arange(len(parts.count)), [a[best], b[best]])
+        parts = concatenate([parts[rest], _sum_pair(parts, a[best], b[best])], 0)
     return parts
 
 
@@ -187,7 +190,7 @@ def _apply(fit: Fit, k: int, parts: Statistics) -> Columns:
     divided, statistics = [], []
     for x, responsibilities in zip(fit.batches, fit.responsibilities, strict=True):
         r = _within(fit.model, x, parts) * responsibilities.r[:, [k]]
-        entropy = np.array([_entropy(r[:, [j]]) for j in range(r.shape[1])])
+        entropy = scipy.special.entr(r).sum(0)
         divided.append(r)
         statistics.append(fit.model.summarise(x, Responsibilities(r, entropy)))
     return Columns(divided, stack(statistics))
@@ -208,7 +211,7 @@ def delete(fit: Fit, k: int) -> bool:
         held = responsibilities.r[:, k]
         rows = np.flatnonzero(held > 0)
         r[rows] += held[rows, None] * fit.model.local_step(x[rows], others).r
-        entropy = np.array([_entropy(r[:, [j]]) for j in range(r.shape[1])])
+        entropy = scipy.special.entr(r).sum(0)
         shared.append(r)
         statistics.append(fit.model.summarise(x, Responsibilities(r, entropy)))
     columns = Columns(shared, stack(statistics))
@@ -216,7 +219,7 @@ def delete(fit: Fit, k: int) -> bool:
 
 
 def _try(
-    fit: Fit, kept: Int[np.ndarray, " K"], added: list[Columns], ids: Int[np.ndarray, " K"], required: float
+    fit: Fit, kept: Int[np.ndarray, " kept"], added: list[Columns], ids: Int[np.ndarray, " K"], required: float
 ) -> bool:
     """Make a change if the ELBO then is at least `required`."""
     proposed = concatenate([fit.statistics[:, kept], *(columns.statistics for columns in added)], 1)

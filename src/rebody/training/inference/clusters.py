@@ -43,9 +43,12 @@ def sample_beliefs(
     replay: Episodes, stored: int, config: MetaConfig, rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "point latent"], Int[np.ndarray, " point"]]:
     """Means of beliefs, and their true base task: family x sign."""
-    size = config.mixture.points
-    group, episode = rng.integers(stored, size=size), rng.integers(config.episodes, size=size)
-    time = rng.integers(config.mixture.from_decision, config.decisions + 1, size=size)
+    begin = config.mixture.from_decision
+    shape = (stored, config.episodes, config.decisions + 1 - begin)
+    size = min(config.mixture.points, int(np.prod(shape)))
+    # none twice: points that coincide look like a cluster
+    group, episode, time = np.unravel_index(rng.choice(np.prod(shape), size, replace=False), shape)
+    time = time + begin
     latent = replay.belief.mean[group, episode, time]
     task = jax.tree.map(lambda leaf: np.asarray(leaf)[group, episode], replay.task)
     return np.asarray(latent, float), base_task(task)

@@ -52,4 +52,42 @@ def position_thesis() -> MetaConfig:
     )
 
 
-PRESETS: dict[str, Callable[[], MetaConfig]] = {"position": position, "position-thesis": position_thesis}
+def goal_velocity() -> MetaConfig:
+    """Reach a hidden position or run at a hidden speed, front or back (thesis 6.4.2), told apart without labels."""
+    return MetaConfig(
+        tasks=TaskDistribution(
+            (
+                BaseTask("goal", 2.0, 15.0),
+                BaseTask("goal", -15.0, -2.0),
+                BaseTask("velocity", 1.0, 3.0),
+                BaseTask("velocity", -3.0, -1.0),
+            )
+        ),
+        reward="relative",
+        inference=InferenceConfig(fields=("x", "vx"), scales=(10.0, 3.0), reward_scale=1.0, latent=6, units=96),
+        sac=SACConfig(
+            hidden=(256, 256),
+            projections=16,
+            discount=0.95,
+            learning_rate=5e-4,
+            decay_updates=150_000,
+            huber=0.05,
+        ),
+        prior="mixture",
+        arrival=0.05,
+        policy_fields=("x", "vx"),
+        policy_scales=(10.0, 3.0),
+        start=(15.0, 3.0),
+        episodes=96,
+        wander_iterations=40,
+        joint_iterations=80,
+        policy_iterations=100,
+        policy_updates=768,
+    )
+
+
+PRESETS: dict[str, Callable[[], MetaConfig]] = {
+    "position": position,
+    "position-thesis": position_thesis,
+    "goal-velocity": goal_velocity,
+}

@@ -26,12 +26,14 @@ from rebody.types import Task
 DECISIONS = 200
 HELD_OUT = 200
 """Held-out tasks per figure."""
+BASE_TASK_AT = 10
+"""Decisions after which the base task (family and sign) should be known."""
 PROBED_FROM = 20
 """A probe is fitted on the beliefs from this decision on."""
 
 
 def measure(parts: InferenceParts, toy: Toy, config: MetaConfig) -> dict[str, float]:
-    """Final error on held-out tasks [m, m/s], return, the oracle's, and R^2 of a linear reading of the target."""
+    """Final error on held-out tasks [m, m/s], return, the oracle's, and what a linear probe reads from beliefs."""
     fitted = _rollout(parts, toy, config, seed=1)
     tasks, episodes = _rollout(parts, toy, config, seed=2)
     figures = {}
@@ -42,9 +44,18 @@ def measure(parts: InferenceParts, toy: Toy, config: MetaConfig) -> dict[str, fl
         figures[f"{name} p95"] = float(np.percentile(errors, 95))
     figures["return"] = float(episodes.reward.sum(0).mean())
     figures["oracle return"] = float(_rollout(parts, toy, config, seed=2, told=True)[1].reward.sum(0).mean())
-    probe = _fit(*fitted)
-    _, read = probe(jax.tree.map(lambda leaf: leaf[PROBED_FROM:], episodes.belief))
-    figures["target R2"] = float(1 - np.var(read - tasks.target) / np.var(tasks.target))
+    return figures | _readings(_fit(*fitted), tasks, episodes)
+
+
+def _readings(probe: Probe, tasks: Task, episodes: Episodes) -> dict[str, float]:
+    """How well a linear probe reads the task from beliefs: R^2 of each family's target, share of right base tasks."""
+    family, target = (np.asarray(part) for part in probe(episodes.belief))
+    right = (family == tasks.family) & (target * tasks.target > 0)
+    figures = {"base task": float(right[BASE_TASK_AT - 1].mean())}
+    for index in np.unique(tasks.family):
+        of_family = tasks.family == index
+        wanted, read = tasks.target[of_family], target[PROBED_FROM:, of_family]
+        figures[f"{FAMILIES[index].name} R2"] = float(1 - np.var(read - wanted) / np.var(wanted))
     return figures
 
 
@@ -72,11 +83,11 @@ def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run
         "toy": describe_toy(toy),
         "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
     }
-    units = {family.name: family.unit for family in FAMILIES}
-    rows = {}
-    for name, value in figures.items():
-        unit = units.get(name.split()[0])
-        rows[f"{name}, {HELD_OUT} held-out tasks, 20 s on the toy"] = f"{value:.5g}" + (f" {unit}" if unit else "")
+    units = {f"{family.name} {figure}": family.unit for family in FAMILIES for figure in ("median", "p95")}
+    rows = {
+        f"{name}, {HELD_OUT} held-out tasks, 20 s on the toy": f"{value:.5g} {units.get(name, '')}".rstrip()
+        for name, value in figures.items()
+    }
     steps = config.iterations * config.episodes * config.decisions
     what = (
         f"Inference module (encoder, decoder, probe) and the toy's high-level policy, trained on a point mass "
