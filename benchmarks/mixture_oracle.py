@@ -3,8 +3,8 @@
     .venv/bin/python benchmarks/mixture_oracle.py
 
 2025 points in five clusters of 400 and one of 25; concentration 5, prior scale 0.1, five batches. The optima are those
-that bnpy and an independent implementation found: corr/full K = 6, -7065.530; axis/diag K = 6, -7159.650; corr/diag at least
--7148.62 with K = 6 (splitting a correlated cluster is legitimately better).
+that bnpy and an independent implementation found: corr/full K = 6, -7065.530; axis/diag K = 6, -7159.650; corr/diag at
+least -7148.62 with K = 6 (splitting a correlated cluster is legitimately better).
 """
 
 from pathlib import Path
