@@ -56,8 +56,7 @@ class DirichletProcessMixture:
     def fit(self, X: Float[np.ndarray, "N D"], y: None = None) -> "DirichletProcessMixture":
         """Fit from one component on; RebodyError for points that are not finite or not [N, D]."""
         X = _checked(X, None)
-        kind = FullGaussians if self.covariance_type == "full" else DiagonalGaussians
-        self._model = Model(kind(self.prior_scale, X.mean(0)), self.concentration)
+        self._model = self._prior(X.mean(0))
         rng = np.random.default_rng(self.random_state)
         if len(X) <= 2 * COARSE:
             return self._finish(*self._run(self._begin(X, rng), rng))
@@ -78,8 +77,7 @@ class DirichletProcessMixture:
 
     def warm_start(self, known: Known, offset: Float[np.ndarray, " D"]) -> "DirichletProcessMixture":
         """Take over what an earlier mixture knew (`known`, and its prior mean); `partial_fit` goes on from there."""
-        kind = FullGaussians if self.covariance_type == "full" else DiagonalGaussians
-        self._model, self.known = Model(kind(self.prior_scale, offset), self.concentration), known
+        self._model, self.known = self._prior(offset), known
         self._order = np.argsort(-known.parameters.components.nu, kind="stable")
         return self
 
@@ -92,6 +90,10 @@ class DirichletProcessMixture:
     def predict(self, X: Float[np.ndarray, "N D"]) -> Int[np.ndarray, " N"]:
         """Index of the most responsible component of each point; `component_ids_` has its lasting id."""
         return np.argmax(self.predict_proba(X), axis=1)
+
+    def _prior(self, offset: Float[np.ndarray, " D"]) -> Model:
+        kind = FullGaussians if self.covariance_type == "full" else DiagonalGaussians
+        return Model(kind(self.prior_scale, offset), self.concentration)
 
     def _begin(self, X: Float[np.ndarray, "N D"], rng: np.random.Generator) -> Fit:
         """One component, or as many as are wanted, around points far from one another."""

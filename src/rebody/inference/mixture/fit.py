@@ -68,14 +68,13 @@ class Fit:
             old[b] = new
         self.refresh()
 
-    def replace(self, columns: Int[np.ndarray, " kept"], added: "list[Columns]", ids: Int[np.ndarray, " K"]) -> None:
+    def replace(self, columns: Int[np.ndarray, " kept"], added: "Columns", ids: Int[np.ndarray, " K"]) -> None:
         """Keep some components, and put new ones behind them."""
         for b, responsibilities in enumerate(self.responsibilities):
-            parts = [responsibilities.r[:, columns], *(c.r[b] for c in added)]
-            entropies = [responsibilities.entropy[columns], *(c.statistics.entropy[b] for c in added)]
-            self.responsibilities[b] = Responsibilities(np.concatenate(parts, 1), np.concatenate(entropies))
-        kept = self.statistics[:, columns]
-        self.statistics = concatenate([kept, *(c.statistics for c in added)], 1) if added else kept
+            r = np.concatenate([responsibilities.r[:, columns], added.r[b]], 1)
+            entropy = np.concatenate([responsibilities.entropy[columns], added.statistics.entropy[b]])
+            self.responsibilities[b] = Responsibilities(r, entropy)
+        self.statistics = concatenate([self.statistics[:, columns], added.statistics], 1)
         self.ids = ids
         self.refresh()
 

@@ -83,7 +83,7 @@ def _merge_pair(fit: Fit, a: int, b: int, required: float) -> bool:
     )
     rest = np.delete(np.arange(fit.k), [a, b])
     survivor = max((a, b), key=lambda k: (int(fit.ids[k]) in fit.homes, fit.total.count[k]))  # who was there before
-    return _try(fit, rest, [Columns(pair, statistics)], np.append(fit.ids[rest], fit.ids[survivor]), required)
+    return _try(fit, rest, Columns(pair, statistics), np.append(fit.ids[rest], fit.ids[survivor]), required)
 
 
 def _sum_pair(statistics: Statistics, a: int, b: int) -> Statistics:
@@ -106,7 +106,7 @@ def birth(fit: Fit, k: int, rng: np.random.Generator) -> bool:
     rest = np.delete(np.arange(fit.k), k)
     fresh = fit.next_id + np.arange(columns.statistics.count.shape[1])
     fresh[_heir(fit, k, combine(columns.statistics))] = fit.ids[k]
-    accepted = _try(fit, rest, [columns], np.concatenate([fit.ids[rest], fresh]), fit.bound + EPSILON)
+    accepted = _try(fit, rest, columns, np.concatenate([fit.ids[rest], fresh]), fit.bound + EPSILON)
     if accepted:
         fit.next_id += columns.statistics.count.shape[1]
     return accepted
@@ -127,14 +127,19 @@ def _design(fit: Fit, k: int, rng: np.random.Generator) -> Statistics | None:
         return None
     model = fit.model
     centres = spread(model.gaussians.whiten(x, fit.parameters.components, k), weight, rng)
-    r = (centres[:, None] == np.arange(centres.max() + 1)).astype(float) * weight[:, None]
-    parts = model.summarise(x, Responsibilities(r, np.zeros(r.shape[1])))
+    parts = _parts(model, x, weight, (centres[:, None] == np.arange(centres.max() + 1)).astype(float))
     for _ in range(REFINEMENTS):
-        parts = parts[parts.count >= min(SMALLEST, 0.5 * parts.count.max())]
-        r = _within(model, x, parts) * weight[:, None]
-        parts = model.summarise(x, Responsibilities(r, scipy.special.entr(r).sum(0)))
-    parts = _merge_greedily(model, parts[parts.count >= min(SMALLEST, 0.5 * parts.count.max())])
+        parts = _parts(model, x, weight, _within(model, x, parts))
+    parts = _merge_greedily(model, parts)
     return parts if len(parts.count) > 1 else None
+
+
+def _parts(
+    model: Model, x: Float[np.ndarray, "N D"], weight: Float[np.ndarray, " N"], share: Float[np.ndarray, "N J"]
+) -> Statistics:
+    """Statistics of the parts that are not too small; a design needs no entropy."""
+    parts = model.summarise(x, Responsibilities(share * weight[:, None], np.zeros(share.shape[1])))
+    return parts[parts.count >= min(SMALLEST, 0.5 * parts.count.max())]
 
 
 def _members(fit: Fit, k: int, rng: np.random.Generator) -> tuple[Float[np.ndarray, "N D"], Float[np.ndarray, " N"]]:
@@ -187,13 +192,8 @@ def _merge_greedily(model: Model, parts: Statistics) -> Statistics:
 
 def _apply(fit: Fit, k: int, parts: Statistics) -> Columns:
     """Divide component k's share of every point."""
-    divided, statistics = [], []
-    for x, responsibilities in zip(fit.batches, fit.responsibilities, strict=True):
-        r = _within(fit.model, x, parts) * responsibilities.r[:, [k]]
-        entropy = scipy.special.entr(r).sum(0)
-        divided.append(r)
-        statistics.append(fit.model.summarise(x, Responsibilities(r, entropy)))
-    return Columns(divided, stack(statistics))
+    pairs = zip(fit.batches, fit.responsibilities, strict=True)
+    return _columns(fit, [_within(fit.model, x, parts) * responsibilities.r[:, [k]] for x, responsibilities in pairs])
 
 
 # delete
@@ -205,24 +205,28 @@ def delete(fit: Fit, k: int) -> bool:
         return False
     rest = np.delete(np.arange(fit.k), k)
     others = fit.model.global_step(fit.total[rest])
-    shared, statistics = [], []
+    shared = []
     for x, responsibilities in zip(fit.batches, fit.responsibilities, strict=True):
         r = responsibilities.r[:, rest]
         held = responsibilities.r[:, k]
         rows = np.flatnonzero(held > 0)
         r[rows] += held[rows, None] * fit.model.local_step(x[rows], others).r
-        entropy = scipy.special.entr(r).sum(0)
         shared.append(r)
-        statistics.append(fit.model.summarise(x, Responsibilities(r, entropy)))
-    columns = Columns(shared, stack(statistics))
-    return _try(fit, np.zeros(0, int), [columns], fit.ids[rest], fit.bound)
+    return _try(fit, np.zeros(0, int), _columns(fit, shared), fit.ids[rest], fit.bound)
 
 
-def _try(
-    fit: Fit, kept: Int[np.ndarray, " kept"], added: list[Columns], ids: Int[np.ndarray, " K"], required: float
-) -> bool:
+def _columns(fit: Fit, r: list[Float[np.ndarray, "_ J"]]) -> Columns:
+    """Components that have these responsibilities in each batch."""
+    statistics = []
+    for x, share in zip(fit.batches, r, strict=True):
+        entropy = scipy.special.entr(share).sum(0)
+        statistics.append(fit.model.summarise(x, Responsibilities(share, entropy)))
+    return Columns(r, stack(statistics))
+
+
+def _try(fit: Fit, kept: Int[np.ndarray, " kept"], added: Columns, ids: Int[np.ndarray, " K"], required: float) -> bool:
     """Make a change if the ELBO then is at least `required`."""
-    proposed = concatenate([fit.statistics[:, kept], *(columns.statistics for columns in added)], 1)
+    proposed = concatenate([fit.statistics[:, kept], added.statistics], 1)
     if not fit.model.bound(combine(proposed)) >= required:
         return False
     fit.replace(kept, added, ids)

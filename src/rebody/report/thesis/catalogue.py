@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rebody.errors import RebodyError
 from rebody.report.thesis import first_experiment as first
-from rebody.report.thesis.data import Data, save
+from rebody.report.thesis.data import Data, save, shipped
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ FIGURES = {
         ThesisFigure(
             "6.1",
             "the toy in MuJoCo, and the forces on it",
-            first.shipped("6.1"),
+            shipped("6.1"),
             first.toy_picture,
             first.draw_toy,
             "Left: the mass-damper toy as MuJoCo draws it. Right: what acts on it. The action is the share of the"
@@ -51,7 +51,7 @@ FIGURES = {
         ThesisFigure(
             "6.3",
             "the trained module on the toy",
-            first.shipped("6.3"),
+            shipped("6.3"),
             lambda _: first.on_toy(),
             first.draw_episodes,
             "12 hidden goals in [0, 10] m on the position toy (steps of at most 0.1 m). Left: the way (dots: "
@@ -61,7 +61,7 @@ FIGURES = {
         ThesisFigure(
             "6.5",
             "a flat policy on the cheetah: trajectories",
-            first.shipped("6.5"),
+            shipped("6.5"),
             lambda _: first.flat_on_cheetah(),
             first.draw_episodes,
             "The frozen module `position` on the cheetah with a policy that has no hierarchy in it (`flat-"
@@ -90,7 +90,7 @@ FIGURES = {
         ThesisFigure(
             "6.8",
             "the naive transfer to the cheetah: a decision at every control step",
-            first.shipped("6.8"),
+            shipped("6.8"),
             lambda _: first.thesis_on_cheetah(1),
             first.draw_transfer,
             "`position-thesis`, frozen, on the cheetah in thesis mode with stride 1: 12 hidden goals in [0, 10] "
@@ -100,7 +100,7 @@ FIGURES = {
         ThesisFigure(
             "6.9",
             "striding on the cheetah",
-            first.shipped("6.9"),
+            shipped("6.9"),
             lambda _: first.strides_on_cheetah(),
             first.draw_strides,
             "`position-thesis`, frozen, on the cheetah in thesis mode with strides of 10, 50 and 100 control "

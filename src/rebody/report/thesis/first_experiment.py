@@ -12,7 +12,7 @@ from rebody.bodies.toy_models import mass_damper_model
 from rebody.bodies.toys import MassDamper
 from rebody.evaluation.evaluate import Trial
 from rebody.report.style import BELIEF, ORACLE, TRUTH, figure
-from rebody.report.thesis.data import Data, join, shipped, split, training_log, trajectories
+from rebody.report.thesis.data import Data, join, split, training_log, trajectories
 from rebody.report.thesis.panels import (
     caption,
     draw_curve,
@@ -24,8 +24,6 @@ from rebody.report.thesis.panels import (
 from rebody.training.flat import FlatConfig, train_flat
 from rebody.training.inference import PRESETS, train_inference
 from rebody.training.tracker import TrackerConfig, train_tracker
-
-__all__ = ["shipped"]
 
 THESIS_GOALS = np.linspace(0.5, 10.0, 12)
 GOALS = np.linspace(-10.0, 10.0, 12)

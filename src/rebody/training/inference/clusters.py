@@ -3,8 +3,6 @@
 import jax
 import numpy as np
 from jaxtyping import Float, Int
-from sklearn.metrics import adjusted_rand_score, normalized_mutual_info_score
-from sklearn.metrics.cluster import contingency_matrix
 
 from rebody.inference.mixture import DirichletProcessMixture
 from rebody.inference.mixture.padded import Clusters, recall, remember
@@ -61,6 +59,10 @@ def base_task(task: Task) -> Int[np.ndarray, "*batch"]:
 
 def agreement(cluster: Int[np.ndarray, " point"], label: Int[np.ndarray, " point"]) -> dict[str, float]:
     """Purity, adjusted Rand index and normalised mutual information of clusters and labels."""
+    # takes a second to import, which every command would wait for
+    from sklearn.metrics import adjusted_rand_score, normalized_mutual_info_score
+    from sklearn.metrics.cluster import contingency_matrix
+
     return {
         "purity": contingency_matrix(label, cluster).max(axis=0).sum() / len(label),
         "ari": adjusted_rand_score(label, cluster),
