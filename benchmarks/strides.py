@@ -20,7 +20,7 @@ from rebody.evaluation.summary import percentile_95, with_interval
 from rebody.report.style import BELIEF, MOTION, figure
 from rebody.tasks.figures import final_error
 from rebody.tasks.task_file import TaskSpec, active_tasks, read_tasks
-from rebody.types import DECISION_DT
+from rebody.types import DECISION_DT, Task
 
 TASKS = Path(__file__).parent / "tasks" / "position-thesis.json"
 SECONDS = {1: 40.0, 5: 60.0, 10: 80.0, 50: 350.0, 100: 700.0}
@@ -65,7 +65,7 @@ def measure(trial: Trial, specs: list[TaskSpec], seeds: np.ndarray) -> dict[str,
     last_outside = len(x) - 1 - np.argmax(outside[::-1], axis=0)
     settled = np.where(outside.any(0), DECISION_DT * (last_outside + 2), DECISION_DT)
     return {
-        "error": np.array([final_error("goal", spec.target, x[:, i]) for i, spec in enumerate(specs)]),
+        "error": final_error(Task(tasks.family[-1], tasks.target[-1]), episodes.state),
         "oscillation": x[-len(x) // 5 :].std(axis=0),
         "settled": np.where(outside[-1], np.inf, settled),
         "fell": np.asarray(episodes.fell),

@@ -34,7 +34,9 @@ from rebody.inference.contract import Contract  # noqa: E402
 from rebody.inference.probe import Probe  # noqa: E402
 from rebody.store import tree_hash  # noqa: E402
 from rebody.training.flat import report as flat_report  # noqa: E402
+from rebody.training.inference import measure as inference_measure  # noqa: E402
 from rebody.training.inference import report as inference_report  # noqa: E402
+from rebody.training.inference import train as inference_train  # noqa: E402
 from rebody.training.tracker import report as tracker_report  # noqa: E402
 
 WINDOW, SECONDS = 6, 3.0
@@ -120,6 +122,12 @@ FLAGS = {
         --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
     """,
 }
+FULL = """
+    --preset goal-velocity-stand --switch-share 0.5 --mixture.from-iteration 1 --mixture.maximum 6
+    --inference.window None --inference.latent 5 --inference.kinds 2 --inference.label-weight 0.05
+    --wander-iterations 1 --joint-iterations 2 --policy-iterations 1
+"""
+"""Beside those of `inference`, all that a module can have: three families, a carried state, a split latent, labels."""
 
 
 @contextmanager
@@ -129,7 +137,8 @@ def in_short() -> Iterator[pytest.MonkeyPatch]:
         patched.setattr(tracker_report, "COMMANDS", 4)
         patched.setattr(tracker_report, "SECONDS", 3.0)
         patched.setattr(inference_report, "HELD_OUT", 8)
-        patched.setattr(inference_report, "DECISIONS", 40)
+        patched.setattr(inference_train, "HELD_OUT", 8)
+        patched.setattr(inference_measure, "DECISIONS", 60)
         patched.setattr(flat_report, "TASKS", 3)
         patched.setattr(flat_report, "DECISIONS", 30)
         yield patched
@@ -147,6 +156,15 @@ def own_module(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("trained") / "inference"
     with in_short():
         assert run([*FLAGS["inference"].split(), "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="session")
+def full_module(tmp_path_factory) -> Path:
+    """Folder of an inference module of the full toy."""
+    folder = tmp_path_factory.mktemp("trained") / "full"
+    with in_short():
+        assert run([*FLAGS["inference"].split(), *FULL.split(), "--out", str(folder)]) == 0
     return folder
 
 

@@ -10,11 +10,14 @@ import pytest
 
 from rebody.agents.agent import Observation
 from rebody.agents.build import AGENTS, build_agent
+from rebody.agents.parts import Inference, inference_template
 from rebody.agents.rollout import begin, decide
+from rebody.bodies.toys import FullToy
 from rebody.errors import RebodyError
+from rebody.inference.contract import Contract
 from rebody.inference.probe import fit_probe
-from rebody.tasks import GOAL, VELOCITY
-from rebody.types import Belief, GlobalState, Task
+from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.types import Belief, GlobalState, Task, Transition
 
 SIZE, DECISIONS = 3, 8
 
@@ -203,7 +206,63 @@ def test_an_agent_that_there_is_not(inference):
         build_agent("resue", inference)
 
 
-def test_reuse_of_several_families_is_refused(inference):
+def test_reuse_of_several_families_acts_by_the_policy_on_the_point_mass(inference):
+    """What it would say to a robot it may not say; `check_fit` sees to that."""
     contract = replace(inference.contract, target_ranges={"goal": (-1.0, 1.0), "velocity": (-1.0, 1.0)})
-    with pytest.raises(RebodyError, match="'tiny' tells several families apart"):
-        build_agent("reuse", replace(inference, contract=contract))
+    command = say(build_agent("reuse", replace(inference, contract=contract)), STATE, BELIEF, FIRST)
+    np.testing.assert_allclose(command.action, inference.parts.high_level(STATE, BELIEF), rtol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def standing(stored_config):
+    """A module that learned to stand at a pitch, on the full toy."""
+    config = stored_config | {
+        "contract": stored_config["contract"] | {"fields": ("x", "pitch"), "target_ranges": {"stand": (-1.5, 1.5)}},
+        "inference": {
+            "units": 8,
+            "window": None,
+            "latent": 2,
+            "kinds": 1,
+            "fields": ("x", "pitch"),
+            "scales": (9.0, 1.0),
+        },
+        "high_level": stored_config["high_level"] | {"fields": ["pitch", "pitch_rate"]},
+        "toy": {"kind": "full", "max_torque": 6.0},
+    }
+    parts = eqx.filter_jit(lambda: inference_template(config))()
+    parts = eqx.tree_at(
+        lambda p: [policy.actor.net.mlp.weights[-1] for policy in (p.high_level, p.told_policy)],
+        parts,
+        replace_fn=lambda w: 30 * w,
+    )
+    return Inference("standing", Contract.from_config(config["contract"]), parts, FullToy(max_torque=6.0))
+
+
+@pytest.mark.parametrize("kind", ["reuse", "readout", "bayes", "oracle", "idle"])
+def test_an_action_has_as_many_numbers_as_the_toy_takes(standing, kind):
+    tasks = Task(np.full((1, SIZE), STAND), np.ones((1, SIZE), np.float32))
+    action = say(build_agent(kind, standing, tasks), STATE, BELIEF, FIRST).action
+    assert action.shape == (SIZE, 3)
+    assert np.isfinite(action).all()
+    assert (kind == "idle") == (not np.asarray(action).any())
+
+
+def test_a_subgoal_to_stand_is_the_pitch_that_the_full_toy_would_have(standing):
+    state = replace(STATE, pitch=np.array([0.3, -1.0, 0.0], "f4"), pitch_rate=np.array([1.0, 0.0, -2.0], "f4"))
+    command = say(build_agent("reuse", standing, horizon=4), state, BELIEF, FIRST)
+    pitch, turn = np.array(state.pitch), np.array(state.pitch_rate)
+    for _ in range(4):
+        observation = np.concatenate([np.stack([pitch / 10.0, turn / 3.5], axis=-1), BELIEF_FEATURES], axis=-1)
+        torque = 6.0 * np.asarray(standing.parts.high_level.actor(observation.astype(np.float32)))[:, 2]
+        turn = turn + 0.1 * (torque - 4.0 * turn - 4.0 * pitch)
+        pitch = pitch + 0.1 * turn
+    np.testing.assert_allclose(command.subgoal.value, pitch, atol=1e-5)
+    np.testing.assert_array_equal(command.subgoal.slot, [STAND] * SIZE)
+
+
+def test_without_a_window_an_agent_believes_what_the_whole_episode_says(standing, heard):
+    beliefs, _ = listen(build_agent("reuse", standing), heard)
+    moments = jax.tree.map(lambda leaf: np.swapaxes(leaf, 0, 1), heard)
+    before, after = (jax.tree.map(lambda leaf, s=s: leaf[:, s], moments.state) for s in (slice(-1), slice(1, None)))
+    whole = standing.parts.module.encoder.along(Transition(before, moments.reward[:, 1:], after))
+    np.testing.assert_allclose(beliefs.mean[1:], np.swapaxes(whole.mean, 0, 1), rtol=1e-4, atol=1e-5)

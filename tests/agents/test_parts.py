@@ -1,14 +1,16 @@
 """From artifacts to parts: what is loaded acts as what was saved."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.agents.build import check_fit
-from rebody.agents.parts import load_flat, load_inference, load_tracker
-from rebody.bodies.toys import MassDamper, PositionToy, describe_toy
+from rebody.agents.build import AGENTS, check_fit
+from rebody.agents.parts import inference_template, load_flat, load_inference, load_tracker
+from rebody.bodies.toys import FullToy, MassDamper, PositionToy, describe_toy
 from rebody.errors import RebodyError
 from rebody.store import save_artifact, tree_hash, tree_to_arrays
 
@@ -92,10 +94,54 @@ def test_a_loaded_flat_policy_acts_as_the_saved_one(flat_policy, tmp_path):
         load_flat(str(tmp_path / "f"))
 
 
+@pytest.mark.parametrize("kinds", [0, 2])
+def test_a_module_is_loaded_with_its_mixture(kinds, stored_config, tmp_path):
+    """All that the full toy brings along: three actions, a split latent, no window, a labeller, clusters."""
+    config = stored_config | {
+        "contract": stored_config["contract"] | {"window": None},
+        "inference": {"units": 8, "window": None, "latent": 5, "kinds": kinds, "label_weight": 0.1},
+        "mixture": {"maximum": 4},
+        "toy": describe_toy(FullToy(max_torque=3.0)),
+    }
+    parts = eqx.filter_jit(lambda: inference_template(config))()
+    active = np.arange(4) < 2
+    parts = eqx.tree_at(
+        lambda p: (p.mixture.active, p.mixture.mean),
+        parts,
+        (active, np.arange(4.0 * (kinds or 5), dtype="f4").reshape(4, -1)),
+    )
+    save_artifact(tmp_path / "full", kind="inference", config=config, weights=parts, card="", log="")
+    loaded = load_inference(str(tmp_path / "full"))
+    assert tree_hash(loaded.parts) == tree_hash(parts)
+    assert loaded.parts.mixture.mean.shape == (4, kinds or 5)
+    assert loaded.toy == FullToy(max_torque=3.0)
+    assert loaded.contract.window is loaded.parts.module.encoder.window is None
+    latent = jax.random.normal(jax.random.key(0), (3, kinds or 5))
+    np.testing.assert_allclose(
+        loaded.parts.mixture.responsibilities(latent), parts.mixture.responsibilities(latent), rtol=1e-6
+    )
+    assert loaded.parts.high_level.actor(jnp.zeros((1, 2 + 2 * 5))).shape == (1, 3)
+
+
+def test_a_module_of_before_there_were_mixtures_has_none(saved, stored_config):
+    assert "mixture" not in stored_config
+    assert load_inference(saved()).parts.mixture is None
+
+
 def test_check_fit_names_the_robot(inference):
-    check_fit(inference, "cheetah", ("x", "vx"))
-    with pytest.raises(RebodyError, match="sees x, which 'gripper' does not have"):
-        check_fit(inference, "gripper", ("z",))
+    for kind in AGENTS:
+        check_fit(kind, inference, "cheetah", ("x", "vx"))
+        with pytest.raises(RebodyError, match="sees x, which 'gripper' does not have"):
+            check_fit(kind, inference, "gripper", ("z",))
+
+
+def test_on_robots_reuse_is_for_modules_of_one_family(inference):
+    contract = replace(inference.contract, target_ranges={"goal": (-1.0, 1.0), "velocity": (-1.0, 1.0)})
+    several = replace(inference, contract=contract)
+    for kind in set(AGENTS) - {"reuse"}:
+        check_fit(kind, several, "cheetah", ("x", "vx"))
+    with pytest.raises(RebodyError, match=r"'tiny' tells several families apart.*On a point mass it can"):
+        check_fit("reuse", several, "cheetah", ("x", "vx"))
 
 
 def test_the_tiny_parts_are_not_all_alike(inference):

@@ -179,7 +179,7 @@ def test_in_thesis_mode_the_module_hears_of_the_world_once_per_stride(tracker, c
     """What is returned stays 0.1 s apart, and velocities are those of the last 0.1 s, also between decisions."""
     task, qpos = lasting(1.0), []
     task.target[WINDOW // 2 :] = -1.0
-    listener = IdleAgent(inferrer=Listener(), reader=lambda belief: None, stride=1)
+    listener = IdleAgent(inferrer=Listener(), reader=lambda belief: None, stride=1, actions=1)
     episodes = rollout_on_robot(
         listener, TrackerController(tracker), cheetah, task, "plain", SEEDS[:1],
         lambda batch, _: qpos.append(batch.qpos[0].copy()), tick_steps,
@@ -214,7 +214,7 @@ def test_a_flat_policy_moves_by_the_belief_alone(inference, flat_policy, cheetah
     episodes = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS)
     assert np.isnan(episodes.subgoal.value).all()
     assert np.isfinite(episodes.state.x).all()
-    deaf = IdleAgent(inferrer=Deaf(), reader=lambda belief: None, stride=1)
+    deaf = IdleAgent(inferrer=Deaf(), reader=lambda belief: None, stride=1, actions=1)
     deaf = rollout_on_robot(deaf, controller, cheetah, tasks, "plain", SEEDS)
     np.testing.assert_allclose(deaf.state.x[0], episodes.state.x[0], atol=1e-5)  # both begin with the prior
     assert np.abs(deaf.state.x[-1] - episodes.state.x[-1]).min() > 1e-4

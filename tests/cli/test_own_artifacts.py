@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from rebody.agents.parts import load_inference
-from rebody.bodies.toys import MassDamper, PositionToy
+from rebody.bodies.toys import FullToy, MassDamper, PositionToy
 from rebody.cli.main import run
 from rebody.store import load_artifact, save_artifact
+from rebody.tasks import GOAL, STAND, VELOCITY
 
 SECONDS, DECISIONS = "3", 30
 TASKS = [
@@ -152,6 +153,51 @@ def test_a_module_of_the_position_toy(tiny_training, tmp_path):
     other = [*tiny_training["inference"], *untrained, "--preset", "position-thesis", "--toy", "mass-damper"]
     assert run([*other, "--out", str(tmp_path / "other")]) == 0
     assert load_inference(str(tmp_path / "other")).toy == MassDamper()
+
+
+def test_a_module_of_the_full_toy_is_what_was_asked_for(full_module):
+    loaded = load_inference(str(full_module))
+    module = loaded.parts.module
+    assert loaded.toy == FullToy()
+    assert loaded.contract.target_ranges.keys() == {"goal", "velocity", "stand"}
+    assert loaded.contract.window is module.encoder.window is None
+    assert (module.encoder.latent, module.encoder.kinds, module.decoder.kinds) == (5, 2, 2)
+    assert module.labeller.weights[-1].shape == (5, 6)
+    assert loaded.parts.mixture.mean.shape == (6, 2)
+    assert loaded.parts.mixture.active.any()
+    assert np.abs(loaded.parts.probe.target_weights).max(axis=0).min() > 0
+    assert sorted(loaded.parts.probe.families) == [GOAL, VELOCITY, STAND]
+    log = (full_module / "log.csv").read_text().splitlines()
+    assert len(log) == 5
+    assert {"kl", "mixture/components", "told/critic_loss"} <= set(log[0].split(","))
+    card = (full_module / "card.md").read_text()
+    for said in ("stand median", "decisions to a new base task", "false changes in 1000", "family ARI of 2000 beliefs"):
+        assert said in card
+
+
+def test_a_module_of_the_full_toy_acts_on_it_as_when_it_was_saved(full_module, tasks, tmp_path):
+    tasks.write_text(json.dumps([{"family": "stand", "target": -1.0}, {"family": "velocity", "target": 2.0}]))
+    parts = ["--inference", str(full_module), "--robot", "point-mass", "--seconds", SECONDS]
+    results = []
+    for agent in ("reuse", "reuse", "oracle", "readout", "bayes", "idle"):
+        out = tmp_path / "out.json"
+        assert run(["evaluate", "--tasks", str(tasks), *parts, "--agent", agent, "--json", str(out)]) == 0
+        results.append(json.loads(out.read_text()))
+    assert results[0] == results[1]
+    assert results[0]["summary"]["families"].keys() == {"stand", "velocity"}
+    stands = results[0]["episodes"][0]
+    missed = np.abs(np.array(stands["pitch_rad"]) + 1.0)
+    np.testing.assert_allclose(stands["reward"], -missed, atol=1e-4)  # relative to 1 rad
+    assert stands["final_error"] == pytest.approx(missed[-20:].mean(), abs=1e-4)
+    assert np.abs(stands["pitch_rad"]).max() > 0
+    assert not np.any([episode["pitch_rad"] for episode in results[-1]["episodes"]])
+    assert {cluster for episode in results[0]["episodes"] for cluster in episode["cluster"]} <= set(range(6))
+
+
+def test_a_module_that_stands_does_not_fit_a_robot_whose_tracker_cannot(full_module, trained, tasks, capsys):
+    parts = ["--inference", str(full_module), "--tracker", str(trained["tracker"])]
+    code = run(["evaluate", "--tasks", str(tasks), *parts, "--robot", "cheetah"])
+    refused(code, capsys, "no slot for stand")
 
 
 def test_the_same_command_writes_the_same_results(trained, evaluate):

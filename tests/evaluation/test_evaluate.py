@@ -3,15 +3,19 @@
 import json
 from dataclasses import replace
 
+import equinox as eqx
 import numpy as np
 import pytest
 
 from rebody.agents.build import AGENTS
+from rebody.agents.parts import inference_template
 from rebody.bodies import load_robot
 from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results
 from rebody.evaluation.evaluate import POINT_MASS
+from rebody.inference.contract import Contract
+from rebody.inference.mixture.padded import no_mixture
 from rebody.tasks.task_file import Switch, TaskSpec
 
 SPECS = [TaskSpec("goal", 2.0), TaskSpec("goal", 1.0, Switch(1.2, "goal", -3.0))]
@@ -112,6 +116,63 @@ def test_a_point_mass_may_be_another_one_than_the_module_learned_on(trial):
     fast = evaluate(on_the_toy(trial, agent="bayes"), SPECS[:1], 1).episodes[0]
     assert np.abs(np.diff(slow.position_m)).max() <= 0.02 + 1e-5
     assert np.abs(np.diff(fast.position_m)).max() > 0.02 + 1e-3
+
+
+FAR_AND_NEAR = [TaskSpec("goal", target) for target in (-9.0, -3.0, 3.0, 9.0)]
+
+
+@pytest.fixture(scope="module")
+def latent(trial):
+    """What the module believes on the toy, [episode, time, latent]."""
+    return np.array([episode.latent for episode in evaluate(on_the_toy(trial), FAR_AND_NEAR, 1).episodes])
+
+
+@pytest.fixture(scope="module")
+def with_mixture(trial, latent):
+    """A function: the module with two components in its first dimensions, on either side of what it mostly believes."""
+
+    def make(dimensions):
+        mixture, side = no_mixture(3, dimensions), np.eye(dimensions)[0]
+        middle = np.median(latent[..., :dimensions], axis=(0, 1))
+        mixture.active[:2], mixture.mean[:2] = True, [middle + side, middle - side]
+        module = trial.inference
+        parts = eqx.tree_at(lambda p: p.mixture, module.parts, mixture, is_leaf=lambda leaf: leaf is None)
+        return replace(module, parts=parts)
+
+    return make
+
+
+@pytest.mark.parametrize("dimensions", [1, 2])
+def test_each_belief_has_its_cluster(trial, latent, with_mixture, dimensions):
+    """A mixture of fewer dimensions than the latent is that of the first ones."""
+    results = evaluate(on_the_toy(trial, inference=with_mixture(dimensions)), FAR_AND_NEAR, 1)
+    below = latent[..., 0] < np.median(latent[..., 0])
+    np.testing.assert_array_equal([episode.cluster for episode in results.episodes], below.astype(int))
+    assert 0.4 < below.mean() < 0.6
+
+
+def test_who_has_no_latent_that_a_mixture_knows_has_one_cluster(trial, with_mixture):
+    for agent, module in (("bayes", with_mixture(2)), ("reuse", trial.inference)):
+        episodes = evaluate(on_the_toy(trial, agent=agent, inference=module), SPECS, 1).episodes
+        assert {cluster for episode in episodes for cluster in episode.cluster} == {0}
+
+
+def test_a_module_of_several_families_is_for_the_point_mass_and_for_readout(trial):
+    ranges = {"goal": (-10.0, 10.0), "velocity": (-3.0, 3.0)}
+    config = {
+        "contract": replace(trial.inference.contract, target_ranges=ranges).to_config(),
+        "inference": {"units": 8, "window": 6, "latent": 2},
+        "high_level": {"fields": ["x", "vx"], "scales": [10.0, 3.5], "hidden": [8], "projections": 0},
+        "toy": {"kind": "mass-damper"},
+    }
+    parts = eqx.filter_jit(lambda: inference_template(config))()
+    several = replace(trial.inference, contract=Contract.from_config(config["contract"]), parts=parts)
+    specs = [TaskSpec("goal", 2.0), TaskSpec("velocity", -1.0)]
+    toy = evaluate(on_the_toy(trial, inference=several), specs, 1)
+    assert set(toy.summary["families"]) == {"goal", "velocity"}
+    assert evaluate(replace(trial, inference=several, agent="readout"), specs, 1).episodes
+    with pytest.raises(RebodyError, match="'tiny' tells several families apart"):
+        evaluate(replace(trial, inference=several), specs, 1)
 
 
 def test_a_flat_policy_has_no_subgoal(trial, tmp_path):

@@ -12,7 +12,7 @@ from rich.console import Console
 from rebody.agents.rollout import Episodes
 from rebody.evaluation import Results, save_results, summary_table
 from rebody.evaluation.results import episode_results
-from rebody.tasks import GOAL, VELOCITY
+from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 from rebody.types import Belief, GlobalState, Subgoal
 
@@ -119,7 +119,8 @@ def judged(episodes):
     family = np.full(episodes.reward.shape, GOAL, np.int32)
     family[-1] = VELOCITY
     read = (family, np.full(family.shape, 0.123456789, np.float32))
-    return episode_results(specs, np.array([0, 3]), tasks, episodes, read, np.array([-7.0, -8.0]))
+    cluster = np.arange(2 * DECISIONS).reshape(DECISIONS, 2) // 60
+    return episode_results(specs, np.array([0, 3]), tasks, episodes, read, cluster, np.array([-7.0, -8.0]))
 
 
 def test_one_entry_per_decision(judged):
@@ -141,6 +142,7 @@ def test_series_are_those_of_the_episode(judged):
     assert stands.subgoal_family == ["goal"] * DECISIONS
     assert stands.inferred_target[0] == 0.12346
     assert stands.inferred_family[-2:] == ["goal", "velocity"]
+    assert stands.cluster == runs.cluster == [0] * 30 + [1] * 10
     assert [episode.seed for episode in judged] == [0, 3]
     assert [episode.fell for episode in judged] == [False, True]
 
@@ -157,6 +159,16 @@ def test_returns_and_errors(judged):
     assert stands.return_ == pytest.approx(-DECISIONS)
     assert (stands.oracle_return, runs.oracle_return) == (-7.0, -8.0)
     assert (stands.final_error, stands.final_squared_error) == pytest.approx((1.0, 1.0))
+
+
+def test_a_pitch_is_judged_as_such(episodes):
+    specs, cluster = [TaskSpec("stand", 1.0), TaskSpec("stand", -0.2)], np.zeros(episodes.reward.shape, int)
+    tasks, read = active_tasks(specs, DECISIONS, 0.1), (np.full(cluster.shape, STAND), episodes.reward)
+    leans = episode_results(specs, np.arange(2), tasks, episodes, read, cluster, None)
+    assert [episode.final_error for episode in leans] == pytest.approx([0.7, 0.5])
+    assert [episode.final_squared_error for episode in leans] == pytest.approx([0.49, 0.25])
+    assert {*leans[0].inferred_family, *leans[1].active_family} == {"stand"}
+    assert leans[0].oracle_return is None
 
 
 def test_after_a_switch_the_error_is_taken_against_the_last_task(judged):

@@ -1,4 +1,4 @@
-"""The encoder's sliding window is exact, and it sees its fields and the reward alone."""
+"""The encoder's memory is exact, windowed or not, and it sees its fields and the reward alone."""
 
 import equinox as eqx
 import jax
@@ -13,12 +13,22 @@ WINDOW, TIME = 5, 13
 SEEN = ("x", "vx")
 
 
+def make(**changes):
+    settings = {"window": WINDOW, "latent": 2, "kinds": 0, "units": 8} | changes
+    return eqx.filter_jit(lambda key: Encoder(fields=SEEN, scales=(10.0, 3.0), reward_scale=10.0, key=key, **settings))(
+        jax.random.key(0)
+    )
+
+
 @pytest.fixture(scope="module")
 def encoder():
-    make = eqx.filter_jit(Encoder)
-    return make(
-        fields=SEEN, scales=(10.0, 3.0), reward_scale=10.0, window=WINDOW, latent=2, units=8, key=jax.random.key(0)
-    )
+    return make()
+
+
+@pytest.fixture(scope="module")
+def carried():
+    """An encoder without a window."""
+    return make(window=None)
 
 
 @pytest.fixture(scope="module")
@@ -130,3 +140,49 @@ def test_variance_stays_in_its_range(encoder, walk):
 def test_episodes_of_a_batch_do_not_mix(encoder, walk, beliefs):
     swapped = stepped(encoder, jax.tree.map(lambda leaf: leaf[::-1], walk))
     assert_same(swapped, jax.tree.map(lambda leaf: leaf[::-1], beliefs))
+
+
+def test_without_a_window_a_belief_rests_on_the_whole_episode(carried, walk):
+    assert carried.initial((2,)).hidden.shape == (2, 1, 8)
+    assert_same(stepped(carried, walk), along(carried, walk))
+
+
+def test_without_a_window_nothing_is_ever_forgotten(carried, walk):
+    moved = eqx.tree_at(lambda w: w.reward, walk, np.where(np.arange(TIME) < 4, -70.0, walk.reward).astype(np.float32))
+    apart = np.abs(stepped(carried, moved).mean - stepped(carried, walk).mean).max(axis=(0, 2))
+    assert (apart > 1e-5).all()  # it fades, as nothing was learned
+
+
+def test_both_begin_alike(carried, walk, beliefs):
+    """The window makes no difference before it is full."""
+    assert_same(at(stepped(carried, walk), WINDOW), at(beliefs, WINDOW))
+    assert np.abs(stepped(carried, walk).mean - beliefs.mean)[:, WINDOW:].max() > 1e-4
+
+
+def test_the_newest_features_gate_amounts_alone(walk):
+    """With a head that says nothing, all that is left of the mean are the gates."""
+    split = make(latent=3, kinds=1, window=None)
+    assert split.gate.weights[-1].shape[1] == 2 * 6
+    silent = eqx.tree_at(
+        lambda e: (e.head.weights[-1], e.head.biases[-1]), split, replace_fn=lambda leaf: np.zeros_like(leaf)
+    )
+    mean = np.asarray(along(silent, walk).mean)
+    assert not mean[..., 0].any()
+    assert np.abs(mean[..., 1:]).max(axis=(0, 1)).min() > 1e-3
+
+
+def test_gates_by_hand():
+    """Amounts move by gate times feature, kinds do not move."""
+    split = make(latent=3, kinds=1)
+    rng = np.random.default_rng(0)
+    hidden, features = rng.normal(size=(4, 8)).astype("f4"), rng.normal(size=(4, 6)).astype("f4")
+    head = np.asarray(split.head(np.concatenate([hidden, features], axis=-1)))[:, :3]
+    gates = np.asarray(split.gate(hidden)).reshape(4, 2, 6)
+    expected = head + np.concatenate([np.zeros((4, 1)), (gates * features[:, None]).sum(-1)], axis=-1)
+    np.testing.assert_allclose(split.belief(hidden, features).mean, expected, rtol=1e-4, atol=1e-5)
+
+
+def test_a_split_latent_steps_as_it_was_trained(walk):
+    for window in (None, TIME):
+        split = make(latent=4, kinds=2, window=window)
+        assert_same(stepped(split, walk), along(split, walk))

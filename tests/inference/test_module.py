@@ -11,12 +11,12 @@ import pytest
 
 from rebody.inference import InferenceConfig, InferenceModule
 from rebody.inference.decoder import Decoder
-from rebody.inference.module import Evidence, loss
-from rebody.inference.prior import unit_gaussian
+from rebody.inference.module import BASE_TASKS, Evidence, loss
+from rebody.inference.prior import SplitPrior, unit_gaussian
 from rebody.types import Belief, GlobalState, Transition
 
 CONFIG = InferenceConfig(window=6, units=32, batch_size=16, decoded=4)
-UPDATES = 200
+UPDATES = 400
 
 
 def states(x):
@@ -37,6 +37,8 @@ def evidence():
     after = before + 0.1 * action[..., 0]
     return Evidence(
         window=Transition(states(x[:, :-1]), -np.abs(x[:, 1:] - goal), states(x[:, 1:])),
+        base_task=np.broadcast_to(goal > 0, (len(goal), CONFIG.window)).astype(np.int32),
+        same_task=np.ones((len(goal), CONFIG.window, CONFIG.decoded), bool),
         previous=states(before),
         action=action,
         reward=-np.abs(after - goal),
@@ -120,7 +122,7 @@ def test_what_is_learned_is_the_task_of_the_window(trained, measured, evidence):
 
 @pytest.fixture(scope="module")
 def decoder():
-    return eqx.filter_jit(Decoder)(2, 1, 3, 8, key=jax.random.key(0))
+    return eqx.filter_jit(Decoder)(2, 1, 3, 0, 8, key=jax.random.key(0))
 
 
 def test_dynamics_do_not_shape_the_latent_and_rewards_do(decoder):
@@ -143,3 +145,199 @@ def test_reward_is_a_weighted_distance_from_a_point_linear_in_the_latent(decoder
     np.testing.assert_allclose(decoder.reward(state, latent).mean, expected, rtol=1e-5)
     np.testing.assert_allclose(decoder.reward(reference, latent).mean, np.zeros(4), atol=1e-6)
     assert len(decoder.reference.weights) == 1
+
+
+@pytest.fixture(scope="module")
+def split_decoder():
+    """Of a latent whose first two dimensions say what kind of task it is, and two how much is asked."""
+    return eqx.filter_jit(Decoder)(3, 1, 4, 2, 8, key=jax.random.key(0))
+
+
+def points(fields, size=6):
+    rng = np.random.default_rng(0)
+    return rng.normal(size=(size, 4)).astype("f4"), rng.normal(size=(size, fields)).astype("f4")
+
+
+def test_kinds_choose_among_the_fields_and_amounts_say_the_rest(split_decoder):
+    latent, state = points(3)
+    kind, amount = latent[:, :2], latent[:, 2:]
+    choice = jax.nn.softmax(split_decoder.choice(kind), axis=-1)
+    weight = jnp.log1p(jnp.exp(split_decoder.weights(amount)))
+    expected = -(weight * choice * jnp.abs(state - split_decoder.reference(amount))).sum(axis=-1)
+    assert weight.shape == (6, 1)
+    np.testing.assert_allclose(split_decoder.reward(state, latent).mean, expected, rtol=1e-5)
+
+
+def test_kinds_that_choose_alike_are_paid_alike(split_decoder):
+    """All that the kinds can do to the reward is to choose: without a choice they do nothing."""
+    latent, state = points(3)
+    other = np.concatenate([latent[:, :2] + 3.0, latent[:, 2:]], axis=-1)
+    assert np.abs(split_decoder.reward(state, latent).mean - split_decoder.reward(state, other).mean).max() > 1e-2
+    blind = eqx.tree_at(lambda d: d.choice.weights[-1], split_decoder, replace_fn=jnp.zeros_like)
+    np.testing.assert_array_equal(blind.reward(state, latent).mean, blind.reward(state, other).mean)
+    slope = jax.grad(lambda z: blind.reward(state, z).mean.sum())(latent)
+    assert not np.asarray(slope)[:, :2].any()
+    assert np.abs(slope[:, 2:]).max(axis=0).min() > 1e-3
+
+
+def test_amounts_have_no_part_in_the_choice(split_decoder):
+    """How much each field counts, relative to the others, is a matter of the kinds alone."""
+    latent, state = points(3)
+
+    def shares(latent):
+        slope = np.abs(jax.grad(lambda s: split_decoder.reward(s, latent).mean.sum())(jnp.asarray(state)))
+        return slope / slope.sum(axis=-1, keepdims=True), slope.sum(axis=-1)
+
+    one, size = shares(latent)
+    two, other_size = shares(latent + np.array([0.0, 0.0, 0.7, -0.4], "f4"))
+    np.testing.assert_allclose(one, two, rtol=1e-4)
+    assert np.abs(size - other_size).min() > 1e-4
+    assert np.abs(one - shares(latent + np.array([0.7, 0.0, 0.0, 0.0], "f4"))[0]).max() > 1e-2
+
+
+def test_the_split_prior_is_the_weighted_sum_of_both():
+    belief = Belief(np.array([[3.0, 1.0, -2.0], [0.0, 0.0, 0.0]]), np.array([[1.0, 1.0, 1.0], [1.0, np.e, np.e]]))
+    np.testing.assert_allclose(SplitPrior(unit_gaussian, 1, 10.0)(belief), [47.5, np.e - 2], rtol=1e-6)
+    np.testing.assert_allclose(SplitPrior(unit_gaussian, 2, 1.0)(belief), unit_gaussian(belief), rtol=1e-6)
+
+
+def test_the_prior_of_the_kinds_sees_nothing_else():
+    def squared_mean(belief):
+        assert belief.mean.shape == belief.variance.shape == (5, 4, 2)
+        return (belief.mean**2).sum(-1) + belief.variance.sum(-1)
+
+    belief = Belief(np.arange(60.0).reshape(5, 4, 3), np.ones((5, 4, 3)))
+    expected = 7 * ((belief.mean[..., :2] ** 2).sum(-1) + 2) + 0.5 * belief.mean[..., 2] ** 2
+    np.testing.assert_allclose(SplitPrior(squared_mean, 2, 7.0)(belief), expected, rtol=1e-6)
+
+
+slopes = eqx.filter_jit(
+    lambda module, evidence, config: eqx.filter_grad(
+        lambda m: loss(m, evidence, unit_gaussian, config, jax.random.key(1))[0]
+    )(module)
+)
+
+
+def assert_same_slopes(module, evidence, other):
+    for one, two in zip(*(jax.tree.leaves(slopes(module, e, CONFIG)) for e in (evidence, other)), strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+@pytest.fixture
+def changing(evidence):
+    """Beliefs of the last half of each window and the last two transitions are of another task."""
+    task_of_belief, task_of_decoded = np.arange(CONFIG.window) >= 3, np.arange(CONFIG.decoded) >= 2
+    same = np.broadcast_to(task_of_belief[:, None] == task_of_decoded, evidence.same_task.shape)
+    return eqx.tree_at(lambda e: e.same_task, evidence, same)
+
+
+def test_a_belief_need_not_explain_what_another_task_paid(untrained, changing):
+    """Beliefs of one task are all that is left in the first window; the transitions of the other do not count."""
+    only_first = eqx.tree_at(lambda e: e.same_task, changing, changing.same_task & (np.arange(CONFIG.decoded) < 2))
+    reward = np.where(np.arange(CONFIG.decoded) < 2, changing.reward, -77.0).astype("f4")
+    assert_same_slopes(untrained, only_first, eqx.tree_at(lambda e: e.reward, only_first, reward))
+    unmasked = eqx.tree_at(lambda e: e.same_task, only_first, np.ones_like(changing.same_task))
+    apart = [
+        slopes(untrained, e, CONFIG).encoder.cell.bias
+        for e in (unmasked, eqx.tree_at(lambda e: e.reward, unmasked, reward))
+    ]
+    assert np.abs(apart[0] - apart[1]).max() > 1e-3
+
+
+def test_the_error_is_the_mean_over_what_beliefs_must_explain(measured, untrained, changing):
+    """Two masks that share the entries among them weigh up to the whole."""
+    everything = np.ones_like(changing.same_task)
+    squared = {}
+    for name, mask in (("same", changing.same_task), ("other", ~changing.same_task), ("all", everything)):
+        metrics = measured(untrained, eqx.tree_at(lambda e: e.same_task, changing, mask))[1]
+        squared[name] = float(metrics["reward_error"]) ** 2
+    assert squared["all"] == pytest.approx((squared["same"] + squared["other"]) / 2, rel=1e-4)
+    assert abs(squared["same"] - squared["other"]) > 1e-3
+
+
+def test_the_state_is_predicted_from_the_last_belief_alone(trained, measured, evidence):
+    """With an encoder that forgets at once, what comes earlier in a window does not reach its last belief."""
+    cell = trained.encoder.cell
+    forgets = cell.bias.at[cell.units : 2 * cell.units].set(-1e4)  # its update gates
+    forgetful = eqx.tree_at(
+        lambda m: (m.encoder.cell.from_hidden, m.encoder.cell.bias),
+        trained,
+        (jnp.zeros_like(cell.from_hidden), forgets),
+    )
+
+    def errors(changed):
+        reward = np.where(changed, -9.0, evidence.window.reward).astype("f4")
+        return measured(forgetful, eqx.tree_at(lambda e: e.window.reward, evidence, reward))[1]
+
+    time = np.arange(CONFIG.window)
+    as_it_was, early, last = errors(time < 0), errors(time < CONFIG.window - 2), errors(time == CONFIG.window - 1)
+    assert early["state_error"] == as_it_was["state_error"] != last["state_error"]
+    assert early["reward_error"] != as_it_was["reward_error"]  # which all beliefs have a part in
+
+
+LABELLED = replace(CONFIG, label_weight=0.5)
+
+
+@pytest.fixture(scope="module")
+def labelled():
+    return eqx.filter_jit(InferenceModule)(LABELLED, 1, jax.random.key(0))
+
+
+@pytest.fixture(scope="module")
+def with_labels():
+    return eqx.filter_jit(
+        lambda module, evidence, config: loss(module, evidence, unit_gaussian, config, jax.random.key(1))
+    )
+
+
+def test_labels_enter_the_loss_as_cross_entropy_by_their_weight(labelled, with_labels, evidence):
+    """A labeller that is sure of the first base task whatever it sees."""
+    logits = np.zeros(BASE_TASKS, "f4")
+    logits[0] = 3.0
+    sure = eqx.tree_at(
+        lambda m: (m.labeller.weights[-1], m.labeller.biases[-1]), labelled, (np.zeros((2, BASE_TASKS), "f4"), logits)
+    )
+    surprise = np.log(np.exp(3.0) + BASE_TASKS - 1)  # nats of any other label
+    without = with_labels(eqx.tree_at(lambda m: m.labeller, sure, None), evidence, LABELLED)[0]
+    for label, expected in ((0, surprise - 3.0), (1, surprise), (5, surprise)):
+        told = eqx.tree_at(lambda e: e.base_task, evidence, np.full_like(evidence.base_task, label))
+        assert float(with_labels(sure, told, LABELLED)[0] - without) == pytest.approx(0.5 * expected, rel=1e-3)
+
+
+def test_right_labels_lower_the_loss(labelled, with_labels, evidence):
+    """A labeller that reads base task 0 or 1 from one dimension of a latent that varies widely."""
+    lively = eqx.tree_at(lambda m: m.encoder.head.weights[-1], labelled, replace_fn=lambda w: 20 * w)
+    mean = np.asarray(lively.encoder.along(evidence.window).mean)[..., 0]
+    direction, threshold = np.array([-20.0, 20.0, 0, 0, 0, 0], "f4"), np.median(mean)
+    reading = (
+        np.stack([direction, 0 * direction]),
+        -threshold * direction + np.array([0, 0, -99, -99, -99, -99], "f4"),
+    )
+    module = eqx.tree_at(lambda m: (m.labeller.weights[-1], m.labeller.biases[-1]), lively, reading)
+    labels = (mean > threshold).astype(np.int32)
+    right, half, wrong = (
+        with_labels(module, eqx.tree_at(lambda e: e.base_task, evidence, told), LABELLED)[0]
+        for told in (labels, np.where(np.arange(CONFIG.window) % 2, labels, 1 - labels), 1 - labels)
+    )
+    assert 0.4 < labels.mean() < 0.6
+    assert right + 1 < half < wrong - 1
+
+
+def test_labels_shape_the_encoder_and_only_where_they_are_used(labelled, untrained, evidence):
+    other = eqx.tree_at(lambda e: e.base_task, evidence, 1 - evidence.base_task)
+    one, two = (slopes(labelled, e, LABELLED).encoder.cell.bias for e in (evidence, other))
+    assert np.abs(one - two).max() > 1e-5
+    assert untrained.labeller is None
+    assert_same_slopes(untrained, evidence, other)
+
+
+def test_a_split_module_learns_what_kind_it_is_by_its_prior(evidence):
+    """The kinds' divergence is weighted, the others' is not."""
+    config = replace(CONFIG, latent=3, kinds=1, kl_weight=0.2)
+    module = eqx.filter_jit(InferenceModule)(config, 1, jax.random.key(0))
+    priors = [SplitPrior(unit_gaussian, 1, weight) for weight in (0.0, 5.0)]
+    found = [eqx.filter_jit(loss)(module, evidence, prior, config, jax.random.key(1)) for prior in priors]
+    belief = module.encoder.along(evidence.window)
+    of_kind = unit_gaussian(Belief(belief.mean[..., :1], belief.variance[..., :1])).mean()
+    assert float(found[1][1]["kl"] - found[0][1]["kl"]) == pytest.approx(5 * float(of_kind), rel=1e-4)
+    assert float(found[1][0] - found[0][0]) == pytest.approx(0.2 * 5 * float(of_kind), rel=1e-3)

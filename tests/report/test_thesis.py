@@ -12,7 +12,10 @@ from rebody.cli.main import run
 from rebody.errors import RebodyError
 from rebody.report.thesis import FIGURES, data, find_figures, make_figure
 from rebody.report.thesis import first_experiment as first
-from rebody.report.thesis.data import join, save, split, training_log, trajectories
+from rebody.report.thesis import several_families as several
+from rebody.report.thesis.data import join, on_goals, save, split, training_log, trajectories
+from rebody.tasks import GOAL, VELOCITY
+from rebody.tasks.task_file import Switch, TaskSpec
 
 CAPTION = "What is seen, in so many words that a line does not hold all of them. " * 4 + "\nMade by a test."
 
@@ -24,7 +27,9 @@ def episodes_of(latent, targets=(-9.0, 0.5, 4.0), decision_s=0.1, time=40):
     return {
         "time_s": time_s,
         "position_m": position,
+        "velocity_m_s": np.gradient(position, axis=0) / 0.1,
         "latent": np.stack([(i + 1) * position / 10 for i in range(latent)], axis=-1),
+        "family": np.full(len(targets), GOAL),
         "target": np.array(targets),
         "decision_s": np.array(decision_s),
     }
@@ -35,6 +40,15 @@ def curves_of(*names, measured_every=3, rows=12):
     steps = 10_000.0 * np.arange(1, rows + 1, dtype=np.float32)
     falling = np.where(np.arange(rows) % measured_every == measured_every - 1, 1e5 / steps, np.nan)
     return {"steps": steps} | {name: falling.astype(np.float32) for name in names}
+
+
+def several_of(episodes=3):
+    """Latents in two dimensions of a few episodes on each base task."""
+    targets = np.concatenate([side * np.arange(2.0, 2.0 + episodes) for side in (1, -1, 1, -1)])
+    data = episodes_of(6, targets)
+    rng = np.random.default_rng(0)
+    family = np.repeat([GOAL, VELOCITY], 2 * episodes)
+    return data | {"family": family} | {name: rng.normal(size=(6, len(targets), 2)) for name in ("tsne", "pca")}
 
 
 PICTURE = {"picture": np.random.default_rng(0).integers(0, 255, (48, 64, 3)).astype(np.uint8)}
@@ -48,7 +62,14 @@ SYNTHETIC = {
     "6.7": curves_of(*(f"evaluation/{slot} {of}" for slot in ("goal", "velocity") for of in ("median", "p95"))),
     "6.8": episodes_of(1, targets=(3.0,), decision_s=0.05),  # a single goal
     "6.9": join(STRIDES | {"ours": episodes_of(2)}),
-}
+    "6.13": curves_of(
+        "return", "evaluation/return", "evaluation/oracle return", "evaluation/goal median",
+        "evaluation/velocity median", "mixture/components", "mixture/births", "mixture/merges", "mixture/purity",
+        "mixture/ari",
+    ),
+    "6.14a": several_of(several.EPISODES),
+    "6.14b": several_of(),
+}  # fmt: skip
 
 
 def assert_drawn(path):
@@ -172,23 +193,61 @@ def test_training_curves_come_out_of_the_artifact(trained, kind, per_iteration, 
     [({}, 0.1), ({"thesis": True, "stride": 3}, 0.15), ({"robot": None, "tracker": None, "flat": None}, 0.1)],
 )
 def test_trajectories_are_those_of_the_trial(trial, changes, decision_s):
-    log = trajectories(replace(trial, **changes), np.array([-3.0, 2.0]))
+    log = on_goals(replace(trial, **changes), np.array([-3.0, 2.0]))
     np.testing.assert_allclose(log["time_s"], 0.1 * np.arange(1, 31))
-    assert log["position_m"].shape == (30, 2)
+    assert log["position_m"].shape == log["velocity_m_s"].shape == (30, 2)
     assert log["latent"].shape == (30, 2, 2)
     np.testing.assert_array_equal(log["target"], [-3.0, 2.0])
+    np.testing.assert_array_equal(log["family"], [GOAL, GOAL])
     assert float(log["decision_s"]) == pytest.approx(decision_s)
     assert np.abs(log["position_m"][-1]).min() > 1e-3
+    displacement = np.diff(log["position_m"], axis=0) / 0.1
+    np.testing.assert_allclose(log["velocity_m_s"][1:], displacement, atol=1e-4)
+
+
+def test_trajectories_are_of_the_task_that_an_episode_ends_with(trial):
+    toy = replace(trial, robot=None, tracker=None, flat=None, agent="oracle")
+    log = trajectories(toy, [TaskSpec("goal", 3.0), TaskSpec("goal", 3.0, Switch(1.0, "goal", -1.0))])
+    np.testing.assert_array_equal(log["target"], [3.0, -1.0])
 
 
 def test_long_trajectories_are_thinned_out(trial, monkeypatch):
-    target = np.array([2.0])
-    whole = trajectories(trial, target)
+    specs = [TaskSpec("goal", 2.0)]
+    whole = trajectories(trial, specs)
     monkeypatch.setattr(data, "POINTS", 12)
-    thin = trajectories(trial, target)
+    thin = trajectories(trial, specs)
     np.testing.assert_allclose(thin["time_s"], [0.3, 0.6, 0.9, 1.2, 1.5, 1.8, 2.1, 2.4, 2.7, 3.0])
-    np.testing.assert_array_equal(thin["position_m"], whole["position_m"][2::3])
-    np.testing.assert_array_equal(thin["latent"], whole["latent"][2::3])
+    for name in ("position_m", "velocity_m_s", "latent"):
+        np.testing.assert_array_equal(thin[name], whole[name][2::3])
+
+
+def test_the_latents_that_are_shown_are_those_of_evenly_spaced_tasks(monkeypatch, trial):
+    """Their two dimensions by PCA span what the episodes' latents do."""
+    asked = []
+
+    def listen(trial, specs):
+        asked.extend(specs)
+        targets = np.array([spec.target for spec in specs])
+        return several_of(several.EPISODES) | {"latent": np.random.default_rng(0).normal(size=(40, len(targets), 6))}
+
+    monkeypatch.setattr(several, "load_inference", lambda name: trial.inference)
+    monkeypatch.setattr(several, "trajectories", listen)
+    log = several.projections()
+    of_family = {name: sorted(spec.target for spec in asked if spec.family == name) for name in ("goal", "velocity")}
+    np.testing.assert_allclose(of_family["goal"], np.sort(np.r_[1, -1][:, None] * np.linspace(2, 15, 12), axis=None))
+    np.testing.assert_allclose(of_family["velocity"], np.sort(np.r_[1, -1][:, None] * np.linspace(1, 3, 12), axis=None))
+    shown = several.on_toy()["latent"][several.FROM :: several.EVERY]
+    assert log["tsne"].shape == log["pca"].shape == (*shown.shape[:2], 2)
+    flat, pca = shown.reshape(-1, 6), log["pca"].reshape(-1, 2)
+    largest = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False)[:2]
+    np.testing.assert_allclose(np.linalg.norm(pca, axis=0), largest, rtol=1e-3)
+
+
+def test_each_base_task_has_its_name_and_colour():
+    data = {"family": np.array([GOAL, GOAL, VELOCITY, VELOCITY]), "target": np.array([3.0, -3.0, 1.0, -1.0])}
+    names = [several.BASE_TASKS[label][0] for label in several._labels(data)]
+    assert names == ["goal in front", "goal behind", "run forward", "run backward"]
+    assert len({colour for _, colour in several.BASE_TASKS.values()}) == 4
 
 
 def test_every_figure_has_a_number_that_the_list_shows(capsys):

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from rebody.errors import RebodyError
-from rebody.tasks import GOAL, VELOCITY, family_index, reward
+from rebody.tasks import GOAL, STAND, VELOCITY, base_task, family_index, reward
 from rebody.types import GlobalState, Task
 
 
-def reward_of(family, target, x=0.0, vx=0.0, form="plain"):
+def reward_of(family, target, x=0.0, vx=0.0, pitch=0.0, form="plain"):
     zero = np.zeros(())
-    state = GlobalState(np.asarray(x), zero, zero, zero, np.asarray(vx), zero, zero, zero)
+    state = GlobalState(np.asarray(x), zero, zero, np.asarray(pitch), np.asarray(vx), zero, zero, zero)
     return float(reward(Task(np.asarray(family), np.asarray(target)), state, form))
 
 
@@ -24,6 +24,9 @@ def reward_of(family, target, x=0.0, vx=0.0, form="plain"):
         (VELOCITY, 2.0, {"x": 9.0, "vx": 1.5}, -0.5, -0.25),
         (VELOCITY, -2.0, {"vx": 1.0}, -3.0, -1.5),
         (VELOCITY, 0.2, {"vx": 0.1}, -0.1, -0.2),  # divided by the floor of 0.5 m/s
+        (STAND, 1.5, {"x": 9.0, "vx": 9.0, "pitch": 0.5}, -1.0, -2 / 3),
+        (STAND, -0.5, {"pitch": 1.0}, -1.5, -3.0),
+        (STAND, 0.1, {"pitch": 0.4}, -0.3, -1.0),  # divided by the floor of 0.3 rad
     ],
 )
 def test_reward_by_hand(family, target, state, plain, relative):
@@ -32,14 +35,19 @@ def test_reward_by_hand(family, target, state, plain, relative):
 
 
 def test_a_batch_holds_different_families():
-    two = np.asarray([2.0, 2.0])
-    zero = np.zeros(2)
-    state = GlobalState(two, zero, zero, zero, zero, zero, zero, zero)
-    task = Task(np.asarray([GOAL, VELOCITY]), two)
-    np.testing.assert_allclose(reward(task, state, "plain"), [0.0, -2.0])
+    two, zero = np.full(3, 2.0), np.zeros(3)
+    state = GlobalState(two, zero, zero, two / 2, zero, zero, zero, zero)
+    task = Task(np.asarray([GOAL, VELOCITY, STAND]), two)
+    np.testing.assert_allclose(reward(task, state, "plain"), [0.0, -2.0, -1.0])
+
+
+def test_front_and_back_of_each_family_are_base_tasks():
+    families, signs = np.repeat([GOAL, VELOCITY, STAND], 2), np.tile([-1.0, 1.0], 3)
+    np.testing.assert_array_equal(base_task(Task(families, 0.01 * signs)), [0, 1, 2, 3, 4, 5])
+    np.testing.assert_array_equal(base_task(Task(families, 100 * signs)), [0, 1, 2, 3, 4, 5])
 
 
 def test_family_index():
-    assert (family_index("goal"), family_index("velocity")) == (GOAL, VELOCITY)
+    assert [family_index(name) for name in ("goal", "velocity", "stand")] == [GOAL, VELOCITY, STAND]
     with pytest.raises(RebodyError, match=r"unknown task family 'velocty'; did you mean 'velocity'\?.*goal"):
         family_index("velocty")

@@ -25,7 +25,7 @@ class Observation(eqx.Module):
 class Command(eqx.Module):
     """What an agent says: an action for a toy, a subgoal for a robot's tracker."""
 
-    action: Float[AnyArray, "*batch 1"]
+    action: Float[AnyArray, "*batch action"]
     subgoal: Subgoal
 
 
@@ -96,6 +96,7 @@ class ReuseAgent(Agent):
     high_level: HighLevelPolicy
     toy: Toy
     family: int = eqx.field(static=True)
+    """Whose slot a robot's subgoals go to; a point mass has none."""
     horizon: int = eqx.field(static=True)
 
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
@@ -163,7 +164,10 @@ class FlatAgent(Agent):
 class IdleAgent(Agent):
     """Knows nothing and stands still: what a body without inference would get."""
 
+    actions: int = eqx.field(static=True)
+    """Numbers in a toy's action."""
+
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """A speed of zero."""
         still = Subgoal(jnp.full(state.x.shape, VELOCITY), jnp.zeros_like(state.x))
-        return Command(jnp.zeros((*state.x.shape, 1)), still)
+        return Command(jnp.zeros((*state.x.shape, self.actions)), still)

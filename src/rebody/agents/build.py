@@ -28,9 +28,14 @@ def check_agent(kind: str) -> None:
         raise RebodyError(f"unknown agent '{kind}'. Agents are: {', '.join(AGENTS)}.")
 
 
-def check_fit(inference: Inference, robot: str, moving_fields: tuple[str, ...]) -> None:
+def check_fit(kind: str, inference: Inference, robot: str, moving_fields: tuple[str, ...]) -> None:
     """RebodyError if this module cannot work on this robot."""
     inference.contract.check_body(robot, moving_fields, SLOTS)
+    if kind == "reuse" and len(inference.contract.families) > 1:
+        raise RebodyError(
+            f"'{inference.name}' tells several families apart; on a robot `reuse` can drive modules of one family so "
+            "far. On a point mass it can, and `readout` can on both."
+        )
 
 
 def build_agent(
@@ -46,8 +51,8 @@ def build_agent(
     told = {"told_policy": parts.told_policy, "task_code": inference.task_code}
     match kind:
         case "reuse":
-            family = _only_family(inference)
-            return ReuseAgent(**listens, high_level=parts.high_level, toy=inference.toy, family=family, horizon=horizon)
+            imagines = {"high_level": parts.high_level, "toy": inference.toy, "horizon": horizon}
+            return ReuseAgent(**listens, **imagines, family=contract.families[0])
         case "readout":
             return ReadoutAgent(**listens, **told)
         case "bayes":
@@ -60,13 +65,4 @@ def build_agent(
         case "flat":
             return FlatAgent(**listens)
         case _:
-            return IdleAgent(**listens)
-
-
-def _only_family(inference: Inference) -> int:
-    family, *others = inference.contract.families
-    if others:
-        raise RebodyError(
-            f"'{inference.name}' tells several families apart; `reuse` can drive modules of one family so far."
-        )
-    return family
+            return IdleAgent(**listens, actions=inference.toy.actions)

@@ -21,7 +21,7 @@ class LiveAgent:
 
     def __init__(self, spec: RobotSpec, inference: Inference, tracker: LoadedTracker, horizon: int = HORIZON):
         """RebodyError if the module does not fit the robot."""
-        check_fit(inference, spec.name, spec.moving_fields)
+        check_fit("reuse", inference, spec.name, spec.moving_fields)
         self._spec, self._inference = spec, inference
         self._controller = TrackerController(tracker.tracker)
         self._agent = build_agent("reuse", inference, horizon=horizon)

@@ -18,6 +18,7 @@ from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig, InferenceModule
 from rebody.inference.contract import Contract
+from rebody.inference.mixture.padded import MixturePrior, no_mixture
 from rebody.inference.probe import Probe
 from rebody.store import Artifact, arrays_into_tree, load_artifact
 from rebody.tasks import family_index
@@ -31,6 +32,7 @@ class InferenceParts(eqx.Module):
     high_level: HighLevelPolicy  # acts by a belief
     told_policy: HighLevelPolicy  # the same, told the task: the toy's oracle
     probe: Probe
+    mixture: MixturePrior | None  # the clusters of beliefs, where there is a mixture
 
 
 @dataclass(frozen=True)
@@ -70,15 +72,17 @@ class LoadedFlat:
 
 def inference_template(config: dict[str, Any]) -> InferenceParts:
     """Parts of the right shapes, to be filled with weights."""
-    inference, policy = config["inference"], config["high_level"]
+    inference, policy, mixture = config["inference"], config["high_level"], config.get("mixture")
+    actions = make_toy(**config["toy"]).actions
     settings = InferenceConfig(**{name: _as_tuple(value) for name, value in inference.items()})
     ranges = config["contract"]["target_ranges"]
     weights = np.zeros((settings.latent + 1, len(ranges)), np.float32)
     return InferenceParts(
-        module=InferenceModule(settings, 1, jax.random.key(0)),
-        high_level=_policy_template(settings.latent, policy),
-        told_policy=_policy_template(2 * len(ranges), policy),
+        module=InferenceModule(settings, actions, jax.random.key(0)),
+        high_level=_policy_template(settings.latent, actions, policy),
+        told_policy=_policy_template(2 * len(ranges), actions, policy),
         probe=Probe(np.zeros(len(ranges), np.int32), weights, weights),
+        mixture=no_mixture(mixture["maximum"], settings.kinds or settings.latent) if mixture else None,
     )
 
 
@@ -141,9 +145,9 @@ def _understood(artifact: Artifact) -> Iterator[None]:
         ) from error
 
 
-def _policy_template(belief_size: int, config: dict[str, Any]) -> HighLevelPolicy:
-    observations = len(config["fields"]) + 2 * belief_size
-    return HighLevelPolicy(_actor_template(observations, 1, config), tuple(config["fields"]), tuple(config["scales"]))
+def _policy_template(belief_size: int, actions: int, config: dict[str, Any]) -> HighLevelPolicy:
+    actor = _actor_template(len(config["fields"]) + 2 * belief_size, actions, config)
+    return HighLevelPolicy(actor, tuple(config["fields"]), tuple(config["scales"]))
 
 
 def _actor_template(observations: int, actions: int, config: dict[str, Any]) -> Actor:

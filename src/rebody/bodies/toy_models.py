@@ -4,7 +4,7 @@ from pathlib import Path
 
 import mujoco
 
-from rebody.bodies.toys import MassDamper, PositionToy
+from rebody.bodies.toys import FullToy, MassDamper, PositionToy
 from rebody.types import DECISION_DT
 
 _MODELS = Path(__file__).parent / "models"
@@ -16,6 +16,20 @@ def mass_damper_model(toy: MassDamper) -> mujoco.MjModel:
     spec.geom("mass").mass = toy.mass
     spec.joint("x").damping[0] = toy.damping
     spec.actuator("force").gear[0] = toy.max_force
+    return spec.compile()
+
+
+def full_toy_model(toy: FullToy) -> mujoco.MjModel:
+    """A model whose time step is one decision of this toy; its controls are its action, without lift in the air."""
+    spec = mujoco.MjSpec.from_file(str(_MODELS / "full_toy.xml"))
+    spec.option.gravity[2] = -toy.gravity
+    body = spec.body("mass")
+    body.mass, body.inertia = toy.mass, [toy.inertia] * 3
+    spec.joint("x").damping[0] = toy.damping
+    pitch = spec.joint("pitch")
+    pitch.damping[0], pitch.stiffness[0] = toy.turn_damping, toy.stiffness
+    for name, gear in (("force", toy.max_force), ("lift", toy.max_lift), ("torque", toy.max_torque)):
+        spec.actuator(name).gear[0] = gear
     return spec.compile()
 
 

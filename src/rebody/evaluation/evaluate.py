@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import jax
 import numpy as np
+from jaxtyping import Int
 
 from rebody.agents.agent import Agent
 from rebody.agents.build import HORIZON, build_agent, check_agent, check_fit
@@ -67,7 +68,7 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
     agent = trial_agent(trial, tasks)
     episodes = run_trial(trial, agent, tasks, episode_seeds)
     oracle = episodes if trial.agent == "oracle" else _run_oracle(trial, tasks, episode_seeds)
-    read = agent.reader(episodes.belief)
+    read, clusters = agent.reader(episodes.belief), _clusters(trial, episodes)
     oracle_returns = None if oracle is None else np.asarray(oracle.reward).sum(axis=0)
     return Results(
         robot=trial.robot_name,
@@ -78,7 +79,7 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
         stride=trial.stride,
         horizon=trial.horizon,
         thesis=trial.thesis,
-        episodes=episode_results(specs, episode_seeds, tasks, episodes, read, oracle_returns),
+        episodes=episode_results(specs, episode_seeds, tasks, episodes, read, clusters, oracle_returns),
     )
 
 
@@ -109,6 +110,15 @@ def _run_oracle(trial: Trial, tasks: Task, seeds: np.ndarray) -> Episodes | None
     return run_trial(told, trial_agent(told, tasks), tasks, seeds)
 
 
+def _clusters(trial: Trial, episodes: Episodes) -> Int[np.ndarray, "time episode"]:
+    """The mixture's component of each belief of the module; 0 where there is one Gaussian, or another inferrer."""
+    mixture, latent = trial.inference.parts.mixture, episodes.belief.mean
+    if mixture is None or trial.agent == "bayes":
+        return np.zeros(latent.shape[:2], int)
+    clustered = latent[..., : mixture.mean.shape[-1]]
+    return np.asarray(mixture.responsibilities(clustered)).argmax(axis=-1)
+
+
 def _controller(trial: Trial) -> Controller:
     if trial.agent == "flat":
         assert trial.flat is not None
@@ -131,7 +141,7 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
         if trial.agent == "flat":
             raise RebodyError("agent 'flat' moves the joints of a robot, and a point mass has none.")
         return
-    check_fit(trial.inference, trial.robot.name, trial.robot.moving_fields)
+    check_fit(trial.agent, trial.inference, trial.robot.name, trial.robot.moving_fields)
     for part in (trial.tracker, trial.flat):
         if part is not None and part.robot != trial.robot.name:
             raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{trial.robot.name}'.")

@@ -108,25 +108,26 @@ def episode_results(
     tasks: Task,
     episodes: Episodes,
     read: tuple[Int[AnyArray, "time episode"], Float[AnyArray, "time episode"]],
+    cluster: Int[np.ndarray, "time episode"],
     oracle_returns: Float[np.ndarray, " episode"] | None,
 ) -> list[EpisodeResult]:
-    """One result per episode, from arrays [time, episode]; `read` is what the probe says."""
+    """One result per episode, from arrays [time, episode]; `read` is what the probe says, `cluster` the mixture."""
     names = np.array([family.name for family in FAMILIES])
     inferred_family, inferred_target = (np.asarray(part) for part in read)
     state = episodes.state
+    last = Task(tasks.family[-1], tasks.target[-1])
+    errors, squared_errors, ripples = final_error(last, state), final_squared_error(last, state), ripple(state)
     results = []
     for i, spec in enumerate(specs):
-        position, velocity = np.asarray(state.x[:, i], float), np.asarray(state.vx[:, i], float)
-        family, target = spec.last.family, spec.last.target
         results.append(
             EpisodeResult(
                 family=spec.family,
                 target=spec.target,
                 seed=int(seeds[i]),
                 switch=None if spec.switch is None else asdict(spec.switch),
-                time_s=_floats(DECISION_DT * np.arange(1, len(position) + 1)),
-                position_m=_floats(position),
-                velocity_m_s=_floats(velocity),
+                time_s=_floats(DECISION_DT * np.arange(1, len(state.x) + 1)),
+                position_m=_floats(state.x[:, i]),
+                velocity_m_s=_floats(state.vx[:, i]),
                 pitch_rad=_floats(state.pitch[:, i]),
                 vz_max_m_s=_floats(_running_max(np.asarray(state.vz[:, i], float))),
                 reward=_floats(episodes.reward[:, i]),
@@ -134,16 +135,16 @@ def episode_results(
                 active_target=_floats(tasks.target[:, i]),
                 inferred_family=names[inferred_family[:, i]].tolist(),
                 inferred_target=_floats(inferred_target[:, i]),
-                cluster=[0] * len(position),  # a single Gaussian prior has one
+                cluster=cluster[:, i].tolist(),
                 latent=[_floats(row) for row in episodes.belief.mean[:, i]],
                 subgoal_family=names[np.asarray(episodes.subgoal.slot[:, i])].tolist(),
                 subgoal=[None if np.isnan(value) else value for value in _floats(episodes.subgoal.value[:, i])],
                 fell=bool(episodes.fell[i]),
                 return_=float(np.sum(episodes.reward[:, i])),
                 oracle_return=None if oracle_returns is None else float(oracle_returns[i]),
-                final_error=final_error(family, target, position),
-                final_squared_error=final_squared_error(family, target, position, velocity),
-                ripple_m_s=ripple(position, velocity),
+                final_error=float(errors[i]),
+                final_squared_error=float(squared_errors[i]),
+                ripple_m_s=float(ripples[i]),
             )
         )
     return results

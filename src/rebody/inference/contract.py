@@ -16,8 +16,8 @@ class Contract:
 
     fields: tuple[str, ...]
     """Fields of the global state that the encoder sees (m, m/s, rad, rad/s)."""
-    window: int
-    """Decisions that a belief rests on."""
+    window: int | None
+    """Decisions that a belief rests on; None for all since the episode began."""
     target_ranges: dict[str, tuple[float, float]]
     """Smallest and largest target per family."""
     reward: RewardForm

@@ -26,19 +26,27 @@ class Decoder(eqx.Module):
     The reward is a weighted distance from a point that is linear in z: all that tasks of the kind "bring this
     to there" need. So targets lie along straight lines of the latent and read out sharply, where an MLP in
     this place curls them up.
+
+    Where z is split, its first dimensions say *what* is to be brought there: they alone share the weight out
+    among the fields, and all else of the reward comes from the others, which say *how much*.
     """
 
     state_head: MLP
     reference: MLP
     weights: MLP
     log_variance: MLP
+    choice: MLP | None
+    kinds: int = eqx.field(static=True)
 
-    def __init__(self, fields: int, actions: int, latent: int, units: int, *, key: PRNGKeyArray):
+    def __init__(self, fields: int, actions: int, latent: int, kinds: int, units: int, *, key: PRNGKeyArray):
         keys = jax.random.split(key, 4)
+        amounts = latent - kinds
+        self.kinds = kinds
         self.state_head = MLP(fields + actions + latent, fields, (units, units), key=keys[0])
-        self.reference = MLP(latent, fields, (), key=keys[1])
-        self.weights = MLP(latent, fields, (units,), key=keys[2])
+        self.reference = MLP(amounts, fields, (), key=keys[1])
+        self.weights = MLP(amounts, 1 if kinds else fields, (units,), key=keys[2])
         self.log_variance = MLP(fields + latent, 1, (units, units), key=keys[3])
+        self.choice = MLP(kinds, fields, (), key=jax.random.fold_in(key, 4)) if kinds else None
 
     def next_state(
         self,
@@ -52,7 +60,10 @@ class Decoder(eqx.Module):
 
     def reward(self, next_state: Float[AnyArray, "*batch field"], latent: Float[AnyArray, "*batch latent"]) -> Gaussian:
         """Predicted reward, in units of the reward scale, and how sure the decoder is of it."""
-        distance = jnp.abs(next_state - self.reference(latent))
-        mean = -jnp.sum(jax.nn.softplus(self.weights(latent)) * distance, axis=-1)
+        kind, amount = latent[..., : self.kinds], latent[..., self.kinds :]
+        weights = jax.nn.softplus(self.weights(amount))
+        if self.choice is not None:
+            weights = weights * jax.nn.softmax(self.choice(kind), axis=-1)
+        mean = -jnp.sum(weights * jnp.abs(next_state - self.reference(amount)), axis=-1)
         log_variance = self.log_variance(jnp.concatenate([next_state, latent], axis=-1))[..., 0]
         return Gaussian(mean, jnp.clip(log_variance, -12.0, 4.0))

@@ -15,7 +15,8 @@ class EncoderCarry(eqx.Module):
     """W recurrent states, each begun one decision after the other.
 
     The oldest has seen exactly the last W transitions, so a belief over a sliding window costs one
-    batched cell step a decision, and no window has to be stored.
+    batched cell step a decision, and no window has to be stored. Without a window there is one state, which
+    has seen everything.
     """
 
     hidden: Float[AnyArray, "*batch window units"]
@@ -33,8 +34,9 @@ class Encoder(eqx.Module):
     fields: tuple[str, ...] = eqx.field(static=True)
     scales: tuple[float, ...] = eqx.field(static=True)
     reward_scale: float = eqx.field(static=True)
-    window: int = eqx.field(static=True)
+    window: int | None = eqx.field(static=True)
     latent: int = eqx.field(static=True)
+    kinds: int = eqx.field(static=True)
 
     def __init__(
         self,
@@ -42,25 +44,29 @@ class Encoder(eqx.Module):
         fields: tuple[str, ...],
         scales: tuple[float, ...],
         reward_scale: float,
-        window: int,
+        window: int | None,
         latent: int,
+        kinds: int,
         units: int,
         key: PRNGKeyArray,
     ):
-        """`scales` divide the fields (m, rad, m/s), `reward_scale` the reward: all near 1 afterwards."""
+        """`scales` divide the fields (m, rad, m/s), `reward_scale` the reward: all near 1 afterwards.
+
+        The first `kinds` of the latent's dimensions say what kind of task it is.
+        """
         keys = jax.random.split(key, 4)
         inputs = 2 * len(fields) + 2
         self.embed = MLP(2 * inputs, units, (units,), key=keys[0])
         self.cell = GRU(units, units, key=keys[1])
         self.head = MLP(units + inputs, 2 * latent, (2 * units, 2 * units), key=keys[2])
-        self.gate = MLP(units, latent * inputs, (units,), key=keys[3], last_scale=0.1)
+        self.gate = MLP(units, (latent - kinds) * inputs, (units,), key=keys[3], last_scale=0.1)
         self.fields, self.scales, self.reward_scale = fields, scales, reward_scale
-        self.window, self.latent = window, latent
+        self.window, self.latent, self.kinds = window, latent, kinds
 
     def initial(self, shape: tuple[int, ...] = ()) -> EncoderCarry:
         """Nothing seen yet."""
         return EncoderCarry(
-            jnp.zeros((*shape, self.window, self.cell.units)),
+            jnp.zeros((*shape, self.window or 1, self.cell.units)),
             jnp.zeros((*shape, 2 * len(self.fields) + 2)),
             jnp.zeros((), jnp.int32),
         )
@@ -72,15 +78,16 @@ class Encoder(eqx.Module):
     def step(self, carry: EncoderCarry, transition: Transition) -> tuple[EncoderCarry, Belief]:
         """One decision: take in a transition, say what is believed now."""
         features = self.features(transition)
-        begins = carry.ticks % self.window
-        is_new = (jnp.arange(self.window) == begins)[:, None]
+        window = self.window or jnp.iinfo(jnp.int32).max
+        begins = carry.ticks % window
+        is_new = (jnp.arange(carry.hidden.shape[-2]) == begins)[:, None]
         inputs = jnp.where(
             is_new,
             self._embed(features, features)[..., None, :],
             self._embed(features, carry.last)[..., None, :],
         )
         hidden = self.cell(jnp.where(is_new, 0.0, carry.hidden), inputs)
-        oldest = jnp.where(carry.ticks < self.window, 0, (carry.ticks + 1) % self.window)
+        oldest = jnp.where(carry.ticks < window, 0, (carry.ticks + 1) % window)
         belief = self.belief(jnp.take(hidden, oldest, axis=-2), features)
         return EncoderCarry(hidden, features, carry.ticks + 1), belief
 
@@ -117,7 +124,8 @@ class Encoder(eqx.Module):
     def belief(self, hidden: Float[AnyArray, "*batch units"], features: Float[AnyArray, "*batch feature"]) -> Belief:
         """Read a belief from a recurrent state and the newest transition's features."""
         mean, raw = jnp.split(self.head(jnp.concatenate([hidden, features], axis=-1)), 2, axis=-1)
-        gates = self.gate(hidden).reshape(*hidden.shape[:-1], self.latent, features.shape[-1])
-        mean = mean + jnp.einsum("...lf,...f->...l", gates, features)
+        gates = self.gate(hidden).reshape(*hidden.shape[:-1], self.latent - self.kinds, features.shape[-1])
+        # how much is asked moves with the newest features; what kind it is does not
+        mean = mean.at[..., self.kinds :].add(jnp.einsum("...lf,...f->...l", gates, features))
         low, high = VARIANCE_RANGE
         return Belief(mean, jnp.exp(jnp.clip(raw - 2.0, jnp.log(low), jnp.log(high))))

@@ -5,12 +5,18 @@ from dataclasses import dataclass
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray
+import optax
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from rebody.inference.decoder import Decoder
 from rebody.inference.encoder import Encoder
 from rebody.inference.prior import Prior
+from rebody.nn import MLP
+from rebody.tasks import FAMILIES
 from rebody.types import AnyArray, GlobalState, Transition
+
+BASE_TASKS = 2 * len(FAMILIES)
+"""Family x sign."""
 
 
 @dataclass(frozen=True)
@@ -23,16 +29,23 @@ class InferenceConfig:
     """What each field is divided by [m, rad, m/s]."""
     reward_scale: float = 10.0
     """What the reward is divided by."""
-    window: int = 32
-    """Transitions that a belief rests on."""
+    window: int | None = 32
+    """Transitions that a belief rests on; None for all since the episode began (a carried state)."""
     latent: int = 2
     """Dimensions of the latent."""
+    kinds: int = 0
+    """Dimensions of the latent, the first, that say what kind of task it is; the others say how much is asked.
+    0 for a latent that is not split."""
     units: int = 64
     """Size of the recurrent state and of the hidden layers."""
     state_weight: float = 0.1
     """Weight of the next state's squared error (thesis 5.5)."""
     kl_weight: float = 1e-4
     """beta of thesis (5.7)."""
+    kind_weight: float = 100.0
+    """Weight of the kinds' share of the divergence, relative to the rest of a split latent."""
+    label_weight: float = 0.0
+    """Weight of the cross-entropy on the true base task, as the ancestors had it (0.05); 0 is label-free."""
     learning_rate: float = 2e-3
     """Adam's step size at the start; a cosine takes it to a twentieth."""
     batch_size: int = 32
@@ -46,26 +59,33 @@ class InferenceModule(eqx.Module):
 
     encoder: Encoder
     decoder: Decoder
+    labeller: MLP | None
+    """Latent -> logits of the base tasks, where labels are used."""
 
     def __init__(self, config: InferenceConfig, actions: int, key: PRNGKeyArray):
         """`actions`: size of the toy's action, which only the decoder sees."""
         encoder_key, decoder_key = jax.random.split(key)
+        label_key = jax.random.fold_in(key, 2)
         self.encoder = Encoder(
             fields=config.fields,
             scales=config.scales,
             reward_scale=config.reward_scale,
             window=config.window,
             latent=config.latent,
+            kinds=config.kinds,
             units=config.units,
             key=encoder_key,
         )
-        self.decoder = Decoder(len(config.fields), actions, config.latent, config.units, key=decoder_key)
+        self.decoder = Decoder(len(config.fields), actions, config.latent, config.kinds, config.units, key=decoder_key)
+        self.labeller = MLP(config.latent, BASE_TASKS, (), key=label_key) if config.label_weight else None
 
 
 class Evidence(eqx.Module):
     """Windows to encode, and transitions of the same episodes that the beliefs must explain."""
 
     window: Transition  # [batch, time]
+    base_task: Int[AnyArray, "batch time"]  # only where labels are used
+    same_task: Bool[AnyArray, "batch time decoded"]  # whether the task of the belief was on in the transition
     previous: GlobalState  # [batch, decoded]
     action: Float[AnyArray, "batch decoded action"]
     reward: Float[AnyArray, "batch decoded"]
@@ -80,21 +100,26 @@ def loss(
     belief = encoder.along(evidence.window)
     noise = jax.random.normal(key, belief.mean.shape)
     latent = belief.mean + jnp.sqrt(belief.variance) * noise  # [batch, time, latent]
-    shape = (*latent.shape[:2], config.decoded)
-    latent = jnp.broadcast_to(latent[:, :, None], (*shape, config.latent))
-
     scales = jnp.asarray(encoder.scales)
-    before = _beside(evidence.previous.select(encoder.fields) / scales, shape)
-    after = _beside(evidence.state.select(encoder.fields) / scales, shape)
-    predicted_state = decoder.next_state(before, _beside(evidence.action, shape), latent)
-    state_error = jnp.mean((predicted_state - after) ** 2)
+    before = evidence.previous.select(encoder.fields) / scales
+    after = evidence.state.select(encoder.fields) / scales
 
-    predicted = decoder.reward(after, latent)
+    # the state's prediction does not shape the latent, so one belief of a window is enough
+    last = jnp.broadcast_to(latent[:, -1:], (*before.shape[:2], config.latent))
+    state_error = jnp.mean((decoder.next_state(before, evidence.action, last) - after) ** 2)
+
+    shape = (*latent.shape[:2], config.decoded)
+    latents = jnp.broadcast_to(latent[:, :, None], (*shape, config.latent))
+    predicted = decoder.reward(jnp.broadcast_to(after[:, None], (*shape, after.shape[-1])), latents)
     wanted = evidence.reward[:, None] / encoder.reward_scale
-    reward_loss = jnp.mean(_weighted_negative_log_likelihood(wanted, predicted))
-    reward_error = jnp.mean((wanted - predicted.mean) ** 2)
+    share = evidence.same_task / jnp.maximum(jnp.sum(evidence.same_task), 1)
+    reward_loss = jnp.sum(share * _weighted_negative_log_likelihood(wanted, predicted))
+    reward_error = jnp.sum(share * (wanted - predicted.mean) ** 2)
 
     reconstruction = reward_loss + config.state_weight * state_error
+    if module.labeller is not None:
+        labels = optax.softmax_cross_entropy_with_integer_labels(module.labeller(latent), evidence.base_task)
+        reconstruction = reconstruction + config.label_weight * jnp.mean(labels)
     kl = jnp.mean(prior(belief))
     metrics = {
         "reward_error": jnp.sqrt(reward_error) * encoder.reward_scale,
@@ -102,10 +127,6 @@ def loss(
         "kl": kl,
     }
     return reconstruction + config.kl_weight * kl, metrics
-
-
-def _beside(x: Float[AnyArray, "batch decoded n"], shape: tuple[int, ...]) -> Float[AnyArray, "batch time decoded n"]:
-    return jnp.broadcast_to(x[:, None], (*shape, x.shape[-1]))
 
 
 def _weighted_negative_log_likelihood(wanted, predicted):

@@ -2,6 +2,7 @@
 
 from typing import Protocol, runtime_checkable
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -15,6 +16,27 @@ class Prior(Protocol):
     def __call__(self, belief: Belief) -> Float[AnyArray, "*batch"]:
         """KL of each belief [nats]."""
         ...
+
+
+class SplitPrior(eqx.Module):
+    """One prior for the dimensions that say what kind of task it is, N(0, I) for those that say how much."""
+
+    kinds: Prior
+    dimensions: int = eqx.field(static=True)
+    """How many say what kind it is."""
+    weight: float = eqx.field(static=True)
+    """Of their divergence, relative to that of the others."""
+
+    def __call__(self, belief: Belief) -> Float[AnyArray, "*batch"]:
+        """The weighted sum of both [nats]."""
+        kind, amount = split(belief, self.dimensions)
+        return self.weight * self.kinds(kind) + unit_gaussian(amount)
+
+
+def split(belief: Belief, dimensions: int) -> tuple[Belief, Belief]:
+    """What kind of task it is, and how much of it."""
+    kind = Belief(belief.mean[..., :dimensions], belief.variance[..., :dimensions])
+    return kind, Belief(belief.mean[..., dimensions:], belief.variance[..., dimensions:])
 
 
 def unit_gaussian(belief: Belief) -> Float[AnyArray, "*batch"]:

@@ -36,7 +36,7 @@ def plot_episode(episode: EpisodeResult, path: Path) -> None:
 def draw_progress(axes: Axes, episode: EpisodeResult, until: int | None = None) -> None:
     """Reached, believed and true value over time, up to a decision."""
     unit = _unit(episode.active_family[-1])
-    reached = episode.position_m if episode.active_family[-1] == "goal" else episode.velocity_m_s
+    reached = _reached(episode)
     axes.plot(episode.time_s, episode.active_target, "--", color=TRUTH, label="hidden target")
     axes.plot(episode.time_s[:until], episode.inferred_target[:until], color=BELIEF, label="read from the belief")
     axes.plot(episode.time_s[:until], reached[:until], color=MOTION, lw=2, label="robot")
@@ -51,12 +51,17 @@ def draw_progress(axes: Axes, episode: EpisodeResult, until: int | None = None) 
     axes.legend(loc="lower right", frameon=False, fontsize=8)
 
 
+def _reached(episode: EpisodeResult) -> list[float]:
+    """The number that the last task is about."""
+    series = {"goal": episode.position_m, "velocity": episode.velocity_m_s, "stand": episode.pitch_rad}
+    return series[episode.active_family[-1]]
+
+
 def _trajectories(axes: Axes, results: Results) -> None:
     largest = max(abs(e.active_target[-1]) for e in results.episodes) or 1.0
     for episode in results.episodes:
         colour = plt.get_cmap(TASKS)(0.5 + 0.5 * episode.active_target[-1] / largest)
-        reached = episode.position_m if episode.active_family[-1] == "goal" else episode.velocity_m_s
-        axes.plot(episode.time_s, reached, color=colour, lw=1.2)
+        axes.plot(episode.time_s, _reached(episode), color=colour, lw=1.2)
         axes.plot(episode.time_s[-1], episode.active_target[-1], "o", color=colour, ms=4, clip_on=False)
     family = results.episodes[0].active_family[-1]
     axes.set(xlabel="time [s]", ylabel=f"{family} [{_unit(family)}]", title="robot (lines), hidden targets (dots)")

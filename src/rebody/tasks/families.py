@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import jax.numpy as jnp
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from rebody.errors import RebodyError
 from rebody.types import AnyArray, GlobalState, Task
@@ -33,8 +33,9 @@ class Family:
 FAMILIES = (
     Family("goal", "m", floor=1.0, tolerance=0.25, achieved=lambda state: state.x),
     Family("velocity", "m/s", floor=0.5, tolerance=0.25, achieved=lambda state: state.vx),
+    Family("stand", "rad", floor=0.3, tolerance=0.2, achieved=lambda state: state.pitch),
 )
-GOAL, VELOCITY = range(2)
+GOAL, VELOCITY, STAND = range(3)
 
 
 def family_names() -> tuple[str, ...]:
@@ -50,6 +51,11 @@ def family_index(name: str) -> int:
     near = difflib.get_close_matches(name, names, n=1)
     hint = f"; did you mean '{near[0]}'?" if near else ""
     raise RebodyError(f"unknown task family '{name}'{hint} Families are: {', '.join(names)}.")
+
+
+def base_task(task: Task) -> Int[AnyArray, "*batch"]:
+    """Family x sign: the thesis counts front and back as two."""
+    return 2 * task.family + (task.target > 0)
 
 
 def reward(task: Task, state: GlobalState, form: RewardForm) -> Float[AnyArray, "*batch"]:

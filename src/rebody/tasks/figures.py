@@ -3,48 +3,54 @@
 import numpy as np
 from jaxtyping import Float
 
-from rebody.tasks.families import FAMILIES
-from rebody.types import DECISION_DT
+from rebody.tasks.families import FAMILIES, VELOCITY
+from rebody.types import DECISION_DT, GlobalState, Task
 
 LAST_S = 2.0
 """The final error is a mean over this many seconds at the end."""
 MEAN_S = 1.0
 """Velocities are judged by the mean over this many seconds."""
 
-Series = Float[np.ndarray, " time"]
+Series = Float[np.ndarray, "time *episode"]
 
 
-def final_error(family: str, target: float, position: Series, start: float = 0.0) -> float:
-    """Mean over the last 2 s of |y - target| [m, m/s]; a velocity is the displacement over 1 s.
+def final_error(task: Task, state: GlobalState, start: float = 0.0) -> Float[np.ndarray, "*episode"]:
+    """Mean over the last 2 s of |y - target| [m, m/s, rad]; a velocity is the displacement over 1 s.
 
-    `position` is x [m] after each decision; `start` is x before the first.
+    `task` is the last one, [*episode]; `state` that after each decision, [time, *episode]; `start` is x before
+    the first [m].
     """
+    judged = [np.asarray(family.achieved(state), float) for family in FAMILIES]
+    judged[VELOCITY] = _mean_velocity(np.asarray(state.x, float), start)
     last = round(LAST_S / DECISION_DT)
-    return float(np.abs(_judged(family, position, start)[-last:] - target).mean())
+    return np.abs(_of_family(task, judged)[-last:] - task.target).mean(axis=0)
 
 
-def final_squared_error(family: str, target: float, position: Series, velocity: Series) -> float:
-    """Squared error at the last decision [m^2, (m/s)^2], to compare with ReMAP."""
-    achieved = position[-1] if family == "goal" else velocity[-1]
-    return float((achieved - target) ** 2)
+def final_squared_error(task: Task, state: GlobalState) -> Float[np.ndarray, "*episode"]:
+    """Squared error at the last decision [m^2, (m/s)^2, rad^2], to compare with ReMAP."""
+    achieved = [np.asarray(family.achieved(state), float)[-1:] for family in FAMILIES]
+    return (_of_family(task, achieved)[-1] - task.target) ** 2
 
 
-def ripple(position: Series, velocity: Series) -> float:
-    """Std over the last 2 s of the 0.1 s velocity about its 1 s mean [m/s]."""
+def ripple(state: GlobalState) -> Float[np.ndarray, "*episode"]:
+    """Std over the last 2 s of the 0.1 s velocity about its 1 s mean [m/s]; states are [time, *episode]."""
     last = round(LAST_S / DECISION_DT)
-    return float(np.std((velocity - _mean_velocity(position, 0.0))[-last:]))
+    position, velocity = np.asarray(state.x, float), np.asarray(state.vx, float)
+    return np.std((velocity - _mean_velocity(position, 0.0))[-last:], axis=0)
 
 
 def tolerance(family: str) -> float:
-    """Within which final error an episode counts as solved [m, m/s]."""
+    """Within which final error an episode counts as solved [m, m/s, rad]."""
     return next(f.tolerance for f in FAMILIES if f.name == family)
 
 
-def _judged(family: str, position: Series, start: float) -> Series:
-    return position if family == "goal" else _mean_velocity(position, start)
+def _of_family(task: Task, by_family: list[Series]) -> Series:
+    family = np.asarray(task.family)
+    chosen = np.broadcast_to(family, (len(by_family[0]), *family.shape))
+    return np.take_along_axis(np.stack(by_family), chosen[None], axis=0)[0]
 
 
 def _mean_velocity(position: Series, start: float) -> Series:
     steps = round(MEAN_S / DECISION_DT)
-    before = np.concatenate([np.full(steps, start), position])[: len(position)]
+    before = np.concatenate([np.full((steps, *position.shape[1:]), start), position])[: len(position)]
     return (position - before) / MEAN_S

@@ -43,3 +43,12 @@ class TaskDistribution:
         low = jnp.asarray([task.low for task in self.base_tasks])[which]
         high = jnp.asarray([task.high for task in self.base_tasks])[which]
         return Task(family, low + (high - low) * jax.random.uniform(where_key, shape))
+
+    def sample_episodes(self, key: PRNGKeyArray, episodes: int, decisions: int, switch_share: float) -> Task:
+        """The active tasks of episodes, [episode, decision]: a share of them changes once, at any decision."""
+        first_key, second_key, switches_key, when_key = jax.random.split(key, 4)
+        first, second = self.sample(first_key, (episodes,)), self.sample(second_key, (episodes,))
+        begins = jax.random.randint(when_key, (episodes,), 1, decisions)
+        begins = jnp.where(jax.random.bernoulli(switches_key, switch_share, (episodes,)), begins, decisions)
+        has_switched = jnp.arange(decisions) >= begins[:, None]
+        return jax.tree.map(lambda a, b: jnp.where(has_switched, b[:, None], a[:, None]), first, second)

@@ -7,10 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.bodies.toys import MassDamper, Randomisation, make_toy
+from rebody.bodies.toys import FullToy, MassDamper, Randomisation, make_toy
 from rebody.control.high_level import policy_observation
-from rebody.tasks import GOAL
+from rebody.tasks import GOAL, STAND, BaseTask, TaskDistribution, reward
 from rebody.training.inference.episodes import collect, refresh_beliefs, roles
+from rebody.training.inference.train import initial_state
 from rebody.types import Transition
 
 TOY = MassDamper()
@@ -36,7 +37,7 @@ def test_roles_are_quarters(config):
 
 def test_episodes_are_what_learning_expects(episodes, config):
     shape = (config.episodes, config.decisions)
-    assert episodes.reward.shape == shape
+    assert episodes.reward.shape == episodes.task.family.shape == episodes.task.target.shape == shape
     assert episodes.action.shape == (*shape, 1)
     assert episodes.state.x.shape == (shape[0], shape[1] + 1)
     assert episodes.belief.mean.shape == (shape[0], shape[1] + 1, config.inference.latent)
@@ -52,8 +53,28 @@ def test_one_hidden_task_explains_all_rewards_of_an_episode(episodes):
     targets = np.where(misses[0] < misses[1], *first[..., 0])
     assert (np.abs(targets) <= 10).all()
     assert len(set(targets.round(3))) == len(targets)
-    np.testing.assert_allclose(targets, episodes.task.target, atol=1e-4)
-    np.testing.assert_array_equal(episodes.task.family, np.full(len(targets), GOAL))
+    np.testing.assert_allclose(episodes.task.target, np.broadcast_to(targets[:, None], x.shape), atol=1e-4)
+    np.testing.assert_array_equal(episodes.task.family, np.full(x.shape, GOAL))
+
+
+def test_each_decision_is_paid_for_the_task_that_is_on(config, state):
+    """In every episode the task changes, and nothing but the rewards tells."""
+    switching, steady = (
+        collect(
+            state.module.encoder, state.sac.actor, TOY, replace(config, switch_share=share), roles(8, True),
+            jax.random.key(5),
+        )
+        for share in (1.0, 0.0)
+    )  # fmt: skip
+    changes = np.diff(switching.task.target, axis=1) != 0
+    np.testing.assert_array_equal(changes.sum(axis=1), np.ones(8))
+    assert len(set(np.nonzero(changes)[1])) > 2
+    after = jax.tree.map(lambda leaf: leaf[:, 1:], switching.state)
+    np.testing.assert_allclose(switching.reward, reward(switching.task, after, config.reward), rtol=1e-5)
+    np.testing.assert_array_equal(switching.action, steady.action)  # wanderers do not listen
+    np.testing.assert_array_equal(switching.task.target[:, 0], steady.task.target[:, 0])
+    before = np.cumsum(changes, axis=1) == 0
+    np.testing.assert_array_equal(switching.reward[:, 1:][before], steady.reward[:, 1:][before])
 
 
 def test_the_first_half_is_nominal_and_moves_by_its_actions(episodes, config):
@@ -117,21 +138,85 @@ def test_beliefs_rest_on_the_window_alone(episodes, config, state):
 
 
 def test_refreshed_beliefs_are_those_made_while_collecting(episodes, config, state):
-    groups = jax.tree.map(lambda leaf: jnp.stack([leaf, jnp.flip(leaf, axis=0)]), episodes)
+    half = config.episodes // 2
+    turned = jax.tree.map(lambda leaf: jnp.concatenate([leaf[:half][::-1], leaf[half:]]), episodes)
+    groups = jax.tree.map(lambda *leaves: jnp.stack(leaves), episodes, turned)
     fresh = refresh_beliefs(state.module.encoder, groups)
     for new, old in zip(jax.tree.leaves(fresh), jax.tree.leaves(groups), strict=True):
         assert new.shape == old.shape
         np.testing.assert_allclose(new, old, atol=1e-5)
 
 
-def test_refreshing_changes_nothing_but_beliefs(episodes, state):
+def test_refreshing_changes_nothing_but_beliefs_of_the_nominal_half(episodes, config, state):
     other = jax.tree.map(lambda leaf: 1.1 * leaf if isinstance(leaf, jax.Array) else leaf, state.module.encoder)
-    groups = jax.tree.map(lambda leaf: leaf[None], episodes)
+    groups = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), episodes)
     fresh = refresh_beliefs(other, groups)
-    assert np.abs(fresh.belief.mean - groups.belief.mean).max() > 1e-3
+    half = config.episodes // 2
+    for name in ("mean", "variance"):
+        apart = np.abs(getattr(fresh.belief, name) - getattr(groups.belief, name))
+        assert (apart[:, :half, 1:].max(axis=(-2, -1)) > 1e-4).all()
+        assert not apart[:, half:].any()
+        assert not apart[:, :, 0].any()
     for name in ("task", "state", "action", "reward"):
         for new, old in zip(*map(jax.tree.leaves, (getattr(fresh, name), getattr(groups, name))), strict=True):
             np.testing.assert_array_equal(new, old)
+
+
+@pytest.fixture(scope="module")
+def standing(config):
+    """Settings of the full toy, which stands at a pitch."""
+    inference = replace(config.inference, fields=("x", "pitch"), scales=(10.0, 1.5), window=None, latent=3, kinds=1)
+    fields = {"policy_fields": ("x", "pitch", "pitch_rate"), "policy_scales": (10.0, 1.5, 3.0)}
+    tasks = TaskDistribution((BaseTask("stand", 0.5, 1.5), BaseTask("goal", -9.0, -1.0)))
+    return replace(config, inference=inference, tasks=tasks, toy="full", **fields)
+
+
+@pytest.fixture(scope="module")
+def stood(standing):
+    """Episodes of the full toy, and the encoder that believed along them."""
+    begun = initial_state(standing, FullToy(), jax.random.key(0))
+    encoder = begun.module.encoder
+    return encoder, collect(encoder, begun.sac.actor, FullToy(), standing, roles(8, False), jax.random.key(1))
+
+
+def test_the_full_toy_acts_in_three_ways_and_is_paid_for_its_pitch(stood, standing):
+    _, episodes = stood
+    assert episodes.action.shape == (8, standing.decisions, 3)
+    assert np.std(episodes.action, axis=(0, 1)).min() > 0.1
+    assert set(np.asarray(episodes.task.family).ravel()) == {GOAL, STAND}
+    after = jax.tree.map(lambda leaf: leaf[:, 1:], episodes.state)
+    achieved = np.where(episodes.task.family == STAND, after.pitch, after.x)
+    np.testing.assert_allclose(episodes.reward, -np.abs(achieved - episodes.task.target), rtol=1e-4, atol=1e-5)
+    assert not np.asarray(episodes.state.z).min() < 0
+    assert np.asarray(episodes.state.z).max() > 0
+
+
+def test_without_a_window_refreshed_beliefs_are_those_made_while_collecting(stood):
+    encoder, episodes = stood
+    transitions = Transition(
+        jax.tree.map(lambda leaf: leaf[:, :-1], episodes.state),
+        episodes.reward,
+        jax.tree.map(lambda leaf: leaf[:, 1:], episodes.state),
+    )
+    whole = encoder.along(transitions)
+    np.testing.assert_allclose(whole.mean, episodes.belief.mean[:, 1:], rtol=1e-4, atol=1e-5)
+    groups = jax.tree.map(lambda leaf: leaf[None], episodes)
+    forgotten = jax.tree.map(jnp.zeros_like, groups.belief)
+    fresh = refresh_beliefs(encoder, replace(groups, belief=forgotten)).belief
+    np.testing.assert_allclose(fresh.mean[0, :4], episodes.belief.mean[:4], rtol=1e-4, atol=1e-5)
+    assert not np.asarray(fresh.mean[0, 4:]).any()
+
+
+def test_a_full_toy_starts_at_any_pitch_that_it_can_hold(standing):
+    wide = replace(standing, episodes=400, decisions=1)
+    begun = initial_state(wide, FullToy(), jax.random.key(0))
+    started = collect(begun.module.encoder, begun.sac.actor, FullToy(), wide, roles(400, True), jax.random.key(2)).state
+    pitch = np.asarray(started.pitch)[:, 0]
+    assert 0.97 * 2.25 < np.abs(pitch).max() <= 2.25
+    assert abs(pitch.mean()) < 0.15 * 2.25
+    assert abs(np.corrcoef(started.x[:, 0], pitch)[0, 1]) < 0.2
+    assert not np.asarray(started.z)[:, 0].any()
+    assert not np.asarray(started.pitch_rate)[:, 0].any()
 
 
 def test_observations_can_be_noisy(config, state):

@@ -9,11 +9,20 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from rebody.inference.mixture.padded import no_clusters
+from rebody.inference.prior import unit_gaussian
 from rebody.store import tree_hash
-from rebody.tasks import GOAL
+from rebody.tasks import GOAL, VELOCITY
 from rebody.training.inference import train
 from rebody.training.inference.episodes import Episodes
-from rebody.training.inference.train import sample_evidence, sample_transitions, store, tell, trained_parts
+from rebody.training.inference.train import (
+    latent_prior,
+    sample_evidence,
+    sample_transitions,
+    store,
+    tell,
+    trained_parts,
+)
 from rebody.types import Belief, GlobalState, Task
 
 
@@ -32,7 +41,7 @@ def labelled(config):
     return jax.tree.map(
         jnp.asarray,
         Episodes(
-            task=Task(np.full(where.shape[:2], GOAL, np.int32), where[..., 0] / 1000),
+            task=Task(np.full(where[..., 1:].shape, GOAL, np.int32), where[..., :-1] / 1000),
             state=state,
             belief=Belief(latent + 0.5, (latent + 1.0) ** 2),
             action=where[..., :-1, None],
@@ -104,23 +113,85 @@ def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, con
     assert not np.asarray(batch.terminal).any()
 
 
-def test_the_oracle_is_told_the_task_of_its_episode_at_every_decision(labelled, config):
+def test_the_oracle_is_told_the_task_that_is_on_at_every_decision(labelled, config):
+    """In this replay, another one at every decision; the last one lasts."""
     told = tell(labelled, config)
-    target = np.asarray(labelled.task.target)[..., None] / 10.0
+    target = np.asarray(labelled.task.target) / 10.0
     assert told.belief.mean.shape == (*labelled.state.x.shape, 2)
     np.testing.assert_array_equal(told.belief.mean[..., 0], np.ones(labelled.state.x.shape))
-    np.testing.assert_allclose(told.belief.mean[..., 1], np.broadcast_to(target, labelled.state.x.shape), rtol=1e-6)
+    np.testing.assert_allclose(told.belief.mean[..., :-1, 1], target, rtol=1e-6)
+    np.testing.assert_allclose(told.belief.mean[..., -1, 1], target[..., -1], rtol=1e-6)
     assert not np.asarray(told.belief.variance).any()
     for name in ("task", "state", "action", "reward"):
         assert tree_hash(getattr(told, name)) == tree_hash(getattr(labelled, name))
 
     plain = replace(config, policy_scales=(1.0, 1.0))
     batch = sample_transitions(told, 3, plain, jax.random.key(0))
-    group, episode, _ = unpack(batch.observation[:, 0])
-    of_episode = np.asarray(labelled.task.target)[group, episode] / 10.0
-    for observation in (batch.observation, batch.next_observation):
-        expected = [np.ones(300), of_episode, np.zeros(300), np.zeros(300)]
+    group, episode, time = unpack(batch.observation[:, 0])
+    for observation, now in (
+        (batch.observation, time),
+        (batch.next_observation, np.minimum(time + 1, config.decisions - 1)),
+    ):
+        expected = [np.ones(300), target[group, episode, now], np.zeros(300), np.zeros(300)]
         np.testing.assert_allclose(observation[:, 2:].T, expected, rtol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def switched(labelled):
+    """The replay, its episodes a speed forward until decision 5, then a goal behind."""
+    is_first = jnp.arange(labelled.task.target.shape[-1]) < 5
+    return eqx.tree_at(
+        lambda e: e.task,
+        labelled,
+        jax.tree.map(
+            lambda leaf: jnp.broadcast_to(leaf, labelled.task.target.shape),
+            Task(jnp.where(is_first, VELOCITY, GOAL), jnp.where(is_first, 2.0, -3.0)),
+        ),
+    )
+
+
+@pytest.mark.parametrize("window", [4, None])
+def test_a_belief_must_explain_its_own_task_alone(switched, config, window):
+    carried = replace(config, inference=replace(config.inference, window=window))
+    evidence = sample_evidence(switched, 3, carried, jax.random.key(0))
+    believed, explained = unpack(evidence.window.previous.x)[2], unpack(evidence.previous.x)[2]
+    assert evidence.same_task.shape == (300, window or config.decisions, config.inference.decoded)
+    assert 0 < np.mean(evidence.same_task) < 1
+    np.testing.assert_array_equal(evidence.same_task, (believed < 5)[:, :, None] == (explained < 5)[:, None])
+    np.testing.assert_array_equal(evidence.base_task, np.where(believed < 5, 2 * VELOCITY + 1, 2 * GOAL))
+
+
+def test_without_a_window_the_encoder_learns_from_whole_episodes(labelled, config):
+    carried = replace(config, inference=replace(config.inference, window=None))
+    time = unpack(sample_evidence(labelled, 3, carried, jax.random.key(0)).window.previous.x)[2]
+    np.testing.assert_array_equal(time, np.broadcast_to(np.arange(config.decisions), (300, config.decisions)))
+
+
+def test_where_the_latent_is_split_the_mixture_is_for_the_kinds_alone(config):
+    belief = Belief(np.array([[1.0, 2.0, 3.0]]), np.array([[0.5, 1.0, 2.0]]))
+    kind, amount = (
+        Belief(belief.mean[:, :1], belief.variance[:, :1]),
+        Belief(belief.mean[:, 1:], belief.variance[:, 1:]),
+    )
+    split = replace(config.inference, latent=3, kinds=1, kind_weight=10.0)
+    clusters = no_clusters(4, 1)
+    clusters.prior.active[0], clusters.prior.mean[0], clusters.prior.spread[0] = True, 5.0, 2.0
+    found = {
+        prior: float(latent_prior(clusters, replace(config, inference=split, prior=prior))(belief)[0])
+        for prior in ("gaussian", "mixture")
+    }
+    kinds, amounts = float(unit_gaussian(kind)[0]), float(unit_gaussian(amount)[0])
+    assert found["gaussian"] == pytest.approx(10 * kinds + amounts, rel=1e-5)
+    # KL of N(1, 0.5) to N(5, 1/2), whose log-determinant is said to be 0: 0.5 (2 * (0.5 + 16) - 1 - ln 0.5)
+    assert found["mixture"] == pytest.approx(10 * 0.5 * (2 * 16.5 - 1 + np.log(2)) + amounts, rel=1e-5)
+    assert latent_prior(clusters, config) is unit_gaussian
+    assert latent_prior(clusters, replace(config, prior="mixture")) is clusters.prior
+
+
+def test_a_mixture_is_kept_where_there_is_one(state, config):
+    assert trained_parts(state, config).mixture is None
+    kept = trained_parts(state, replace(config, prior="mixture")).mixture
+    jax.tree.map(np.testing.assert_array_equal, kept, state.clusters.prior)
 
 
 def test_what_is_kept_are_the_averaged_policies(state, config):
@@ -161,8 +232,9 @@ def test_the_newest_episodes_replace_the_oldest(labelled, config):
         np.testing.assert_array_equal(leaf.reshape(3, -1).T - np.array([4, 5, 3]), 0)
 
 
+@pytest.mark.usefixtures("measured_in_short")
 def test_inference_is_frozen_while_the_policy_learns_on(pipelines, tmp_path, monkeypatch):
-    """One turn of wandering: inference alone. Two with both. Then the policy alone."""
+    """One turn of wandering: inference alone. Two with all, the told policy among them. Then the policy alone."""
     states, iterate = [], train.iterate
     monkeypatch.setattr(train, "iterate", lambda state, *rest: states.append(state) or iterate(state, *rest))
     assert pipelines["inference"](tmp_path / "run") == 0
@@ -174,5 +246,6 @@ def test_inference_is_frozen_while_the_policy_learns_on(pipelines, tmp_path, mon
     assert changed(lambda state: state.module.encoder) == [True, True, True, False, False]
     assert changed(lambda state: state.module.decoder.reference) == [True, True, True, False, False]
     assert changed(lambda state: state.sac.actor) == [False, True, True, True, True]
-    assert changed(lambda state: state.told.actor) == [False, True, True, True, True]
+    assert changed(lambda state: state.told.actor) == [False, True, True, False, False]
+    assert changed(lambda state: state.clusters) == [False, True, True, False, False]
     assert changed(lambda state: state.replay.reward) == 5 * [True]

@@ -73,6 +73,14 @@ def no_clusters(maximum: int, dimensions: int) -> Clusters:
     return Clusters(prior, np.full(maximum, -1), np.zeros((), int), np.zeros(dimensions))
 
 
+def clusters_of(prior: MixturePrior) -> Clusters:
+    """Of a stored mixture: ids begin anew, and the prior mean is that of the components."""
+    prior = jax.tree.map(np.asarray, prior)
+    share = np.where(prior.active, prior.nu, 0.0)
+    ids = np.where(prior.active, np.arange(len(share)), -1)
+    return Clusters(prior, ids, np.array(prior.active.sum()), share @ prior.mean / max(share.sum(), 1.0))
+
+
 def remember(mixture: DirichletProcessMixture, maximum: int) -> Clusters:
     """The largest components of a fitted mixture, at most `maximum`."""
     model, _ = mixture.fitted

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rebody.errors import RebodyError
 from rebody.report.thesis import first_experiment as first
+from rebody.report.thesis import several_families as several
 from rebody.report.thesis.data import Data, save, shipped
 
 
@@ -107,6 +108,35 @@ FIGURES = {
             "steps (0.5, 2.5 and 5 s): counted in decisions all do as the toy does, in seconds a longer stride is"
             " slower by as much. Right: our mode, `position` with a decision every 0.1 s and the toy imagined 15 "
             "decisions ahead.",
+        ),
+        ThesisFigure(
+            "6.13",
+            "return during training on goals and speeds",
+            several.training,
+            several.train_again,
+            several.draw_training,
+            "Learning `goal-velocity` without labels: goals and speeds, front and back. Returns are over 20 s "
+            "(training episodes begin anywhere, and in half of them the task changes). Below: components of the "
+            "Dirichlet process mixture, and how they agree with the four base tasks, which nobody told. Front and "
+            "back share a component: where components are the two families, purity and adjusted Rand index are 0.5.",
+        ),
+        ThesisFigure(
+            "6.14a",
+            "the toy on goals and speeds",
+            shipped("6.14a"),
+            lambda _: several.on_toy(),
+            several.draw_ways,
+            "`goal-velocity` on the mass-damper, from x = 0 at rest. Left: goals, right: speeds. Dotted: what was "
+            "hidden.",
+        ),
+        ThesisFigure(
+            "6.14b",
+            "latents of goals and speeds in two dimensions",
+            shipped("6.14b"),
+            lambda _: several.projections(),
+            several.draw_projections,
+            "Latents of `goal-velocity` from the 20th decision on, 12 tasks of each base task. Left: t-SNE, as in the "
+            "thesis. Right: the two main components (PCA), where distances mean something.",
         ),
     )
 }

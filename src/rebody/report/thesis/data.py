@@ -45,23 +45,30 @@ def training_log(artifact: str | Path, kind: str) -> Data:
     return data | {"steps": data["iteration"] * per_iteration}
 
 
-def trajectories(trial: Trial, targets: np.ndarray) -> Data:
-    """Episodes on hidden goals: time_s [time], position_m [time, episode], latent [time, episode, latent], target.
+def on_goals(trial: Trial, targets: np.ndarray) -> Data:
+    """`trajectories` on hidden goals."""
+    return trajectories(trial, [TaskSpec("goal", float(target)) for target in targets])
 
-    `decision_s` is the time from one decision to the next.
+
+def trajectories(trial: Trial, specs: list[TaskSpec]) -> Data:
+    """Episodes on hidden tasks.
+
+    time_s [time]; position_m and velocity_m_s [time, episode]; latent [time, episode, latent]; family (its index)
+    and target [episode]. `decision_s` is the time from one decision to the next.
     """
-    specs = [TaskSpec("goal", float(target)) for target in targets]
     check_trial(trial, specs)
     tasks = active_tasks(specs, trial.decisions, DECISION_DT)
-    episodes = run_trial(trial, trial_agent(trial, tasks), tasks, np.zeros(len(targets), int))
+    episodes = run_trial(trial, trial_agent(trial, tasks), tasks, np.zeros(len(specs), int))
     every = -(-trial.decisions // POINTS)
     kept = np.arange(every - 1, trial.decisions, every)
     decision_s = trial.stride * trial.robot.control_dt if trial.robot and trial.thesis else DECISION_DT
     return {
         "time_s": DECISION_DT * (kept + 1.0),
         "position_m": np.asarray(episodes.state.x)[kept],
+        "velocity_m_s": np.asarray(episodes.state.vx)[kept],
         "latent": np.asarray(episodes.belief.mean)[kept],
-        "target": np.asarray(targets, float),
+        "family": np.asarray(tasks.family[-1]),
+        "target": np.asarray(tasks.target[-1], float),
         "decision_s": np.array(decision_s),
     }
 

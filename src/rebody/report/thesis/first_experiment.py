@@ -12,7 +12,7 @@ from rebody.bodies.toy_models import mass_damper_model
 from rebody.bodies.toys import MassDamper
 from rebody.evaluation.evaluate import Trial
 from rebody.report.style import BELIEF, ORACLE, TRUTH, figure
-from rebody.report.thesis.data import Data, join, split, training_log, trajectories
+from rebody.report.thesis.data import Data, join, on_goals, split, training_log
 from rebody.report.thesis.panels import (
     caption,
     draw_curve,
@@ -158,13 +158,13 @@ def draw_tracker_training(data: Data, path: Path, text: str) -> None:
 
 def on_toy() -> Data:
     """`position-thesis` on the toy that it learned on."""
-    return trajectories(Trial("reuse", load_inference("position-thesis"), None, None), THESIS_GOALS)
+    return on_goals(Trial("reuse", load_inference("position-thesis"), None, None), THESIS_GOALS)
 
 
 def flat_on_cheetah() -> Data:
     """The flat policy on the cheetah."""
     trial = Trial("flat", load_inference("position"), load_robot("cheetah"), None, flat=load_flat("flat-cheetah"))
-    return trajectories(trial, GOALS)
+    return on_goals(trial, GOALS)
 
 
 def draw_episodes(data: Data, path: Path, text: str) -> None:
@@ -183,13 +183,13 @@ def thesis_on_cheetah(stride: int) -> Data:
     """`position-thesis` on the cheetah in thesis mode."""
     parts = load_inference("position-thesis"), load_robot("cheetah"), load_tracker("tracker-cheetah")
     trial = Trial("reuse", *parts, seconds=SECONDS[stride], stride=stride, horizon=1, thesis=True)
-    return trajectories(trial, THESIS_GOALS)
+    return on_goals(trial, THESIS_GOALS)
 
 
 def our_mode_on_cheetah() -> Data:
     """`position` on the cheetah, a decision every 0.1 s."""
     parts = load_inference("position"), load_robot("cheetah"), load_tracker("tracker-cheetah")
-    return trajectories(Trial("reuse", *parts), THESIS_GOALS)
+    return on_goals(Trial("reuse", *parts), THESIS_GOALS)
 
 
 def strides_on_cheetah() -> Data:

@@ -32,7 +32,7 @@ def measure(policy: FlatPolicy, module: Inference, spec: RobotSpec) -> dict[str,
     tasks = Task(np.full(shape, family_index(name), np.int32), np.broadcast_to(target, shape).copy())
     agent, seeds = build_agent("flat", module), np.arange(TASKS)
     episodes = rollout_on_robot(agent, FlatController(policy), spec, tasks, module.contract.reward, seeds)
-    errors = [final_error(name, float(target[i]), np.asarray(episodes.state.x)[:, i]) for i in range(TASKS)]
+    errors = final_error(Task(tasks.family[-1], target), episodes.state)
     return {
         "median error": float(np.median(errors)),
         "p95 error": float(np.percentile(errors, 95)),

@@ -79,7 +79,7 @@ def train_flat(
     spec, module = load_robot(robot), load_inference(inference)
     if config.steps < spec.steps_per_decision:
         raise RebodyError(f"--steps must be at least the {spec.steps_per_decision} control steps of a decision.")
-    check_fit(module, spec.name, spec.moving_fields)
+    check_fit("flat", module, spec.name, spec.moving_fields)
     settings = {"robot": robot, "inference": inference, "seed": seed, "init_from": init_from}
     run = Run(out, asdict(config) | settings, resume=resume)
     batch = RobotBatch(spec, config.robots)

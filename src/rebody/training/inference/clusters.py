@@ -6,25 +6,19 @@ from jaxtyping import Float, Int
 
 from rebody.inference.mixture import DirichletProcessMixture
 from rebody.inference.mixture.padded import Clusters, recall, remember
-from rebody.training.inference.config import MetaConfig
+from rebody.tasks import base_task
+from rebody.training.inference.config import MetaConfig, MixtureConfig
 from rebody.training.inference.episodes import Episodes
-from rebody.types import Task
+from rebody.types import Belief
 
 
 def refit(
-    clusters: Clusters, replay: Episodes, stored: int, config: MetaConfig, rng: np.random.Generator
+    clusters: Clusters, episodes: Episodes, config: MetaConfig, rng: np.random.Generator
 ) -> tuple[Clusters, dict[str, float]]:
-    """Fit the mixture to beliefs of stored episodes, from what it knew before; says how it went."""
+    """Fit the mixture to beliefs held in episodes, from what it knew before; says how it went."""
     settings = config.mixture
-    mixture = DirichletProcessMixture(
-        covariance_type=settings.covariance_type,
-        concentration=settings.concentration,
-        prior_scale=settings.prior_scale,
-        random_state=int(rng.integers(2**31)),
-        n_components=settings.components,
-    )
-    latent, label = sample_beliefs(replay, stored, config, rng)
-    mixture = recall(clusters, mixture).partial_fit(latent)
+    latent, label = sample_beliefs(episodes, config, rng)
+    mixture = recall(clusters, new_mixture(settings, rng)).partial_fit(latent)
     laps = mixture.history_
     figures = {
         "components": mixture.n_components_,
@@ -37,24 +31,39 @@ def refit(
     return remember(mixture, settings.maximum), {f"mixture/{name}": float(value) for name, value in figures.items()}
 
 
+def new_mixture(settings: MixtureConfig, rng: np.random.Generator) -> DirichletProcessMixture:
+    """A mixture that knows nothing."""
+    return DirichletProcessMixture(
+        covariance_type=settings.covariance_type,
+        concentration=settings.concentration,
+        prior_scale=settings.prior_scale,
+        random_state=int(rng.integers(2**31)),
+        n_components=settings.components,
+    )
+
+
 def sample_beliefs(
-    replay: Episodes, stored: int, config: MetaConfig, rng: np.random.Generator
-) -> tuple[Float[np.ndarray, "point latent"], Int[np.ndarray, " point"]]:
-    """Means of beliefs, and their true base task: family x sign."""
+    episodes: Episodes, config: MetaConfig, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "point clustered"], Int[np.ndarray, " point"]]:
+    """Latents drawn from beliefs, in the dimensions that the mixture clusters, and their true base task.
+
+    Drawn, since the prior is for draws: means alone are a thinner cloud than the loss sees, and fall into strands.
+    """
     begin = config.mixture.from_decision
-    shape = (stored, config.episodes, config.decisions + 1 - begin)
+    shape = (config.episodes, config.decisions + 1 - begin)
     size = min(config.mixture.points, int(np.prod(shape)))
     # none twice: points that coincide look like a cluster
-    group, episode, time = np.unravel_index(rng.choice(np.prod(shape), size, replace=False), shape)
+    episode, time = np.unravel_index(rng.choice(np.prod(shape), size, replace=False), shape)
     time = time + begin
-    latent = replay.belief.mean[group, episode, time]
-    task = jax.tree.map(lambda leaf: np.asarray(leaf)[group, episode], replay.task)
-    return np.asarray(latent, float), base_task(task)
+    latent = draw(jax.tree.map(lambda leaf: np.asarray(leaf)[episode, time], episodes.belief), config, rng)
+    task = jax.tree.map(lambda leaf: np.asarray(leaf)[episode, time - 1], episodes.task)
+    return latent, np.asarray(base_task(task))
 
 
-def base_task(task: Task) -> Int[np.ndarray, "*batch"]:
-    """The thesis counts front and back as two."""
-    return 2 * np.asarray(task.family) + (np.asarray(task.target) > 0)
+def draw(belief: Belief, config: MetaConfig, rng: np.random.Generator) -> Float[np.ndarray, "point clustered"]:
+    """A latent of each belief, in the dimensions that the mixture clusters."""
+    mean, variance = (np.asarray(part[:, : config.clustered], float) for part in (belief.mean, belief.variance))
+    return mean + np.sqrt(variance) * rng.standard_normal(mean.shape)
 
 
 def agreement(cluster: Int[np.ndarray, " point"], label: Int[np.ndarray, " point"]) -> dict[str, float]:

@@ -51,17 +51,19 @@ class MetaConfig:
     """What the latent is drawn towards: one Gaussian, or a Dirichlet process mixture."""
     mixture: MixtureConfig = field(default_factory=MixtureConfig)
     """Settings of the mixture."""
-    toy: Literal["mass-damper", "position"] = "mass-damper"
+    toy: Literal["mass-damper", "position", "full"] = "mass-damper"
     """The body that everything is learned on."""
     arrival: float = 0.0
     """Added to the scaled reward r / reward_scale of the policy's learning when r = 0, half of it at r = -0.1. It
     is a function of the reward alone, and pulls the last centimetres."""
     randomisation: Randomisation = field(default_factory=Randomisation)
     """Disturbances of half of the episodes."""
+    switch_share: float = 0.0
+    """Share of episodes in which the task changes once, at any decision."""
     observation_noise: float = 0.0
     """Variance of the noise on every observed field (thesis, captions of 6.20)."""
     start: tuple[float, float] = (12.0, 3.0)
-    """Episodes start at uniformly random x [m] and vx [m/s] within these."""
+    """Episodes start at uniformly random x [m] and vx [m/s] within these, a full toy at any pitch that it can hold."""
     turn_probability: float = 0.15
     """Chance per decision that a wandering toy changes its mind. It must come to see goals from both sides: while it
     stays on one, a belief in their mirror image explains all that it hears."""
@@ -74,19 +76,24 @@ class MetaConfig:
     wander_iterations: int = 12
     """Iterations at the start in which all toys wander and only inference learns."""
     joint_iterations: int = 38
-    """Iterations after that in which inference and policy learn together."""
+    """Iterations after that in which inference, the policy, and one that is told the task learn together."""
     policy_iterations: int = 90
     """Iterations after that in which inference is frozen and the policy learns on."""
     inference_updates: int = 128
     """Updates of encoder and decoder in an iteration."""
     policy_updates: int = 512
-    """Updates of the policy in an iteration."""
+    """Updates of the policy in an iteration, and of the policy that is told the task in joint ones."""
 
     @property
     def target_ranges(self) -> dict[str, tuple[float, float]]:
         """Smallest and largest target of each family, in the order of their indices."""
         names = [FAMILIES[index].name for index in self.tasks.families]
         return {name: self.tasks.target_range(name) for name in names}
+
+    @property
+    def clustered(self) -> int:
+        """Dimensions of the latent that the mixture clusters: those that say what kind of task it is."""
+        return self.inference.kinds or self.inference.latent
 
     @property
     def inference_iterations(self) -> int:

@@ -34,7 +34,7 @@ def roles(episodes: int, all_wander: bool) -> Roles:
 class Episodes(eqx.Module):
     """Episodes as learning needs them; states and beliefs have one entry more than actions."""
 
-    task: Task  # [*groups, episode]
+    task: Task  # [*groups, episode, time], the active one
     state: GlobalState  # [*groups, episode, time + 1]
     belief: Belief  # [*groups, episode, time + 1]
     action: Float[AnyArray, "*groups episode time action"]
@@ -56,13 +56,14 @@ def collect(
     """
     task_key, start_key, observe_key, held_key, walk_key = jax.random.split(key, 5)
     shape = (config.episodes,)
-    task = config.tasks.sample(task_key, shape)
+    task = config.tasks.sample_episodes(task_key, config.episodes, config.decisions, config.switch_share)
     body = _random_start(toy, config, start_key)
     seen = _observe(toy, body, config, observe_key)
     belief = encoder.prior(shape)
-    held = jax.random.uniform(held_key, (*shape, 1), minval=-1.0)
+    held = jax.random.uniform(held_key, (*shape, toy.actions), minval=-1.0)
 
-    def decide(walk, key):
+    def decide(walk, inputs):
+        task, key = inputs
         body, seen, carry, belief, held = walk
         action_key, step_key, noise_key, wander_key = jax.random.split(key, 4)
         observation = policy_observation(seen, belief, config.policy_fields, config.policy_scales)
@@ -78,15 +79,17 @@ def collect(
 
     walk = (body, seen, encoder.initial(shape), belief, held)
     keys = jax.random.split(walk_key, config.decisions)
-    _, (states, beliefs, actions, rewards) = jax.lax.scan(decide, walk, keys)
+    active = jax.tree.map(lambda leaf: leaf.T, task)
+    _, (states, beliefs, actions, rewards) = jax.lax.scan(decide, walk, (active, keys))
     along = (_prepend(seen, states), _prepend(belief, beliefs), actions, rewards)
     return Episodes(task, *jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), along))
 
 
 @eqx.filter_jit
 def refresh_beliefs(encoder: Encoder, episodes: Episodes) -> Episodes:
-    """The same episodes with the beliefs that today's encoder holds along them."""
-    state, reward = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 2, 0), (episodes.state, episodes.reward))
+    """Groups of episodes with the beliefs that today's encoder holds along the nominal ones: policies learn there."""
+    nominal = episodes.reward.shape[1] // 2
+    state, reward = jax.tree.map(lambda leaf: jnp.moveaxis(leaf[:, :nominal], 2, 0), (episodes.state, episodes.reward))
     transitions = Transition(
         jax.tree.map(lambda leaf: leaf[:-1], state), reward, jax.tree.map(lambda leaf: leaf[1:], state)
     )
@@ -95,15 +98,15 @@ def refresh_beliefs(encoder: Encoder, episodes: Episodes) -> Episodes:
         lambda carry, transition: encoder.step(carry, transition), encoder.initial(shape), transitions
     )
     beliefs = _prepend(encoder.prior(shape), beliefs)
-    beliefs = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, 2), beliefs)
+    beliefs = jax.tree.map(lambda old, new: old.at[:, :nominal].set(jnp.moveaxis(new, 0, 2)), episodes.belief, beliefs)
     return eqx.tree_at(lambda e: e.belief, episodes, beliefs)
 
 
 def _random_start(toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> ToyState:
     """Anywhere, at any speed, so that the latent cannot take the start for the task."""
     where_key, disturbance_key = jax.random.split(key)
-    far, fast = config.start
-    x, vx = jax.random.uniform(where_key, (2, config.episodes), minval=-1.0) * jnp.asarray([[far], [fast]])
+    reach = jnp.asarray([*config.start, toy.max_pitch])[:, None]
+    x, vx, pitch = jax.random.uniform(where_key, (3, config.episodes), minval=-1.0) * reach
     shape = (config.episodes,)
     nominal = jnp.arange(config.episodes) < config.episodes // 2
     disturbance = jax.tree.map(
@@ -111,12 +114,12 @@ def _random_start(toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> ToyState:
         no_disturbance(shape),
         config.randomisation.sample(disturbance_key, shape),
     )
-    return toy.initial(x, vx, disturbance)
+    return toy.initial(x, vx, disturbance, pitch)
 
 
 def _wander(
-    held: Float[AnyArray, "episode 1"], turn_probability: float, key: PRNGKeyArray
-) -> Float[AnyArray, "episode 1"]:
+    held: Float[AnyArray, "episode action"], turn_probability: float, key: PRNGKeyArray
+) -> Float[AnyArray, "episode action"]:
     turn_key, action_key = jax.random.split(key)
     turns = jax.random.bernoulli(turn_key, turn_probability, held.shape)
     return jnp.where(turns, jax.random.uniform(action_key, held.shape, minval=-1.0), held)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import pi
 
 from rebody.bodies.toys import Randomisation
 from rebody.control.sac import SACConfig
@@ -55,22 +56,15 @@ def position_thesis() -> MetaConfig:
 def goal_velocity() -> MetaConfig:
     """Reach a hidden position or run at a hidden speed, front or back (thesis 6.4.2), told apart without labels."""
     return MetaConfig(
-        tasks=TaskDistribution(
-            (
-                BaseTask("goal", 2.0, 15.0),
-                BaseTask("goal", -15.0, -2.0),
-                BaseTask("velocity", 1.0, 3.0),
-                BaseTask("velocity", -3.0, -1.0),
-            )
-        ),
+        tasks=TaskDistribution((*_both_ways("goal", 2.0, 15.0), *_both_ways("velocity", 1.0, 3.0))),
         reward="relative",
-        inference=InferenceConfig(fields=("x", "vx"), scales=(10.0, 3.0), reward_scale=1.0, latent=6, units=96),
+        inference=InferenceConfig(fields=("x", "vx"), scales=(10.0, 3.0), reward_scale=1.0, latent=6, kinds=2),
         sac=SACConfig(
-            hidden=(256, 256),
+            hidden=(128, 128),
             projections=16,
             discount=0.95,
             learning_rate=5e-4,
-            decay_updates=150_000,
+            decay_updates=200_000,
             huber=0.05,
         ),
         prior="mixture",
@@ -78,16 +72,73 @@ def goal_velocity() -> MetaConfig:
         policy_fields=("x", "vx"),
         policy_scales=(10.0, 3.0),
         start=(15.0, 3.0),
+        turn_probability=0.08,
+        switch_share=0.5,
         episodes=96,
         wander_iterations=40,
         joint_iterations=80,
-        policy_iterations=100,
-        policy_updates=768,
+        policy_iterations=120,
+        policy_updates=1024,
     )
+
+
+def goal_velocity_thesis() -> MetaConfig:
+    """`goal-velocity` on the ranges of the thesis' code: +-[1, 25] m and +-[0.5, 3] m/s."""
+    base = goal_velocity()
+    return replace(
+        base,
+        tasks=TaskDistribution((*_both_ways("goal", 1.0, 25.0), *_both_ways("velocity", 0.5, 3.0))),
+        inference=replace(base.inference, scales=(15.0, 3.0)),
+        policy_scales=(15.0, 3.0),
+        start=(25.0, 3.0),
+    )
+
+
+def goal_velocity_noise_0() -> MetaConfig:
+    """`goal-velocity` without ripple, lag and gain: nothing disturbs the toy."""
+    return _noisy(0.0)
+
+
+def goal_velocity_noise_01() -> MetaConfig:
+    """`goal-velocity` with the thesis' observation noise of variance 0.1 in their place."""
+    return _noisy(0.1)
+
+
+def goal_velocity_noise_02() -> MetaConfig:
+    """`goal-velocity` with the thesis' observation noise of variance 0.2 in their place."""
+    return _noisy(0.2)
+
+
+def goal_velocity_stand() -> MetaConfig:
+    """`goal-velocity`, or stand at a hidden pitch, front or back, on the full toy (thesis 6.5.2)."""
+    base = goal_velocity()
+    return replace(
+        base,
+        tasks=TaskDistribution((*base.tasks.base_tasks, *_both_ways("stand", pi / 6, pi / 2))),
+        toy="full",
+        inference=replace(base.inference, fields=("x", "vx", "pitch"), scales=(10.0, 3.0, 1.5), latent=8, kinds=3),
+        policy_fields=("x", "vx", "pitch", "pitch_rate"),
+        policy_scales=(10.0, 3.0, 1.5, 3.0),
+        joint_iterations=100,
+    )
+
+
+def _noisy(variance: float) -> MetaConfig:
+    calm = Randomisation(ripple_amplitude=0.0, pitch_ripple=0.0, lag=0.0, gain=(1.0, 1.0))
+    return replace(goal_velocity(), randomisation=calm, observation_noise=variance)
+
+
+def _both_ways(family: str, low: float, high: float) -> tuple[BaseTask, BaseTask]:
+    return BaseTask(family, low, high), BaseTask(family, -high, -low)
 
 
 PRESETS: dict[str, Callable[[], MetaConfig]] = {
     "position": position,
     "position-thesis": position_thesis,
     "goal-velocity": goal_velocity,
+    "goal-velocity-thesis": goal_velocity_thesis,
+    "goal-velocity-noise-0": goal_velocity_noise_0,
+    "goal-velocity-noise-0.1": goal_velocity_noise_01,
+    "goal-velocity-noise-0.2": goal_velocity_noise_02,
+    "goal-velocity-stand": goal_velocity_stand,
 }

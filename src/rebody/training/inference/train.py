@@ -20,18 +20,22 @@ from rebody.control import sac
 from rebody.control.high_level import HighLevelPolicy, policy_observation
 from rebody.control.sac import SACBatch, SACState
 from rebody.errors import RebodyError
-from rebody.inference.mixture.padded import Clusters, no_clusters
+from rebody.inference.mixture.padded import Clusters, clusters_of, no_clusters
 from rebody.inference.module import Evidence, InferenceModule, loss
-from rebody.inference.prior import Prior, unit_gaussian
+from rebody.inference.prior import Prior, SplitPrior, unit_gaussian
 from rebody.inference.probe import Probe
+from rebody.tasks import base_task
 from rebody.training.inference.clusters import refit
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, collect, refresh_beliefs, roles
-from rebody.training.inference.report import measure, save_inference
+from rebody.training.inference.measure import measure
+from rebody.training.inference.report import save_inference
 from rebody.training.run import Metrics, Run
 from rebody.types import AnyArray, Transition
 
 EVALUATE_EVERY = 10
+HELD_OUT = 200
+"""Held-out tasks of an evaluation."""
 BEGINS_AT_START = 0.3
 """Share of windows that begin with their episode, when nothing is known: the first decisions count."""
 
@@ -80,39 +84,51 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
     metrics = {"return": episodes.reward[acting.decides].sum(-1).mean()}
     replay, stored = store(state.replay, episodes, state.iteration)
     if iteration < config.inference_iterations:
-        prior = clusters.prior if config.prior == "mixture" else unit_gaussian
-        module, optimiser, inference_metrics = update_inference(
-            module, optimiser, replay, stored, prior, config, keys[1]
-        )
-        metrics |= inference_metrics
-        replay = refresh_beliefs(module.encoder, replay)
         if config.prior == "mixture" and iteration >= config.mixture.from_iteration:
             rng = np.random.default_rng(np.asarray(jax.random.key_data(keys[1])))
-            clusters, cluster_metrics = refit(clusters, replay, int(stored), config, rng)
+            clusters, cluster_metrics = refit(clusters, episodes, config, rng)
             metrics |= cluster_metrics
+        module, optimiser, inference_metrics = update_inference(
+            module, optimiser, replay, stored, latent_prior(clusters, config), config, keys[1]
+        )
+        metrics |= inference_metrics
     if iteration >= config.wander_iterations:
+        if iteration < config.inference_iterations:
+            replay = refresh_beliefs(module.encoder, replay)
+            # it acts in no episode itself: later ones, of a policy that hardly explores, would lead it astray
+            told, told_metrics = update_policy(told, tell(replay, config), stored, config, keys[2])
+            metrics |= {f"told/{name}": value for name, value in told_metrics.items()}
         policy, policy_metrics = update_policy(policy, replay, stored, config, keys[2])
-        told, told_metrics = update_policy(told, tell(replay, config), stored, config, keys[2])
-        metrics |= policy_metrics | {f"told/{name}": value for name, value in told_metrics.items()}
+        metrics |= policy_metrics
     state = RunState(module, optimiser, policy, told, clusters, replay, state.iteration + 1)
     if (iteration + 1) % EVALUATE_EVERY == 0:
-        figures = measure(trained_parts(state, config), toy, config)
+        figures = measure(trained_parts(state, config), toy, config, HELD_OUT)
         metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
     return state, {name: float(value) for name, value in metrics.items()}
+
+
+def latent_prior(clusters: Clusters, config: MetaConfig) -> Prior:
+    """What the latent is drawn towards: where it is split, the mixture is for the kinds alone."""
+    kinds = clusters.prior if config.prior == "mixture" else unit_gaussian
+    inference = config.inference
+    return SplitPrior(kinds, inference.kinds, inference.kind_weight) if inference.kinds else kinds
 
 
 def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: str | None = None) -> RunState:
     """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
-    module = InferenceModule(config.inference, 1, module_key)
+    module = InferenceModule(config.inference, toy.actions, module_key)
     observations, families = len(config.policy_fields), len(config.tasks.families)
-    policy = sac.initial_state(observations + 2 * config.inference.latent, 1, config.sac, sac_key)
-    told = sac.initial_state(observations + 2 * 2 * families, 1, config.sac, sac_key)
+    policy = sac.initial_state(observations + 2 * config.inference.latent, toy.actions, config.sac, sac_key)
+    told = sac.initial_state(observations + 2 * 2 * families, toy.actions, config.sac, sac_key)
+    clusters = no_clusters(config.mixture.maximum, config.clustered)
     if init_from is not None:
         parts = load_inference(init_from).parts
         module = _take_over(parts.module, module, init_from)
         policy = sac.take_over(policy, parts.high_level.actor, init_from)
         told = sac.take_over(told, parts.told_policy.actor, init_from)
+        if parts.mixture is not None and parts.mixture.mean.shape == clusters.prior.mean.shape:
+            clusters = clusters_of(parts.mixture)
     one_group = jax.eval_shape(
         lambda: collect(module.encoder, policy.actor, toy, config, roles(config.episodes, True), key)
     )
@@ -121,7 +137,7 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
         optimiser=_optimiser(config).init(eqx.filter(module, eqx.is_array)),
         sac=policy,
         told=told,
-        clusters=no_clusters(config.mixture.maximum, config.inference.latent),
+        clusters=clusters,
         replay=jax.tree.map(lambda leaf: jnp.zeros((config.groups, *leaf.shape), leaf.dtype), one_group),
         iteration=jnp.zeros((), jnp.int32),
     )
@@ -141,7 +157,8 @@ def trained_parts(state: RunState, config: MetaConfig) -> InferenceParts:
     )
     unfitted = jnp.zeros((config.inference.latent + 1, len(config.tasks.families)))
     probe = Probe(jnp.asarray(config.tasks.families), unfitted, unfitted)
-    return InferenceParts(state.module, by_belief, by_task, probe)
+    mixture = jax.tree.map(jnp.asarray, state.clusters.prior) if config.prior == "mixture" else None
+    return InferenceParts(state.module, by_belief, by_task, probe, mixture)
 
 
 @eqx.filter_jit
@@ -194,15 +211,15 @@ def update_policy(
 
 
 def tell(episodes: Episodes, config: MetaConfig) -> Episodes:
-    """The same episodes with the truth in place of what was believed."""
-    lasting = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf[..., None], episodes.state.x.shape), episodes.task)
-    return eqx.tree_at(lambda e: e.belief, episodes, task_code(config.target_ranges)(lasting))
+    """The same episodes with the truth in place of what was believed; the last task lasts beyond the end."""
+    active = jax.tree.map(lambda leaf: jnp.concatenate([leaf, leaf[..., -1:]], axis=-1), episodes.task)
+    return eqx.tree_at(lambda e: e.belief, episodes, task_code(config.target_ranges)(active))
 
 
 def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray) -> Evidence:
     """Windows of stored episodes, and transitions of the same episodes that their beliefs must explain."""
     keys = jax.random.split(key, 5)
-    size, window = config.inference.batch_size, config.inference.window
+    size, window = config.inference.batch_size, config.inference.window or config.decisions
     group = jax.random.randint(keys[0], (size, 1), 0, stored)
     episode = jax.random.randint(keys[1], (size, 1), 0, config.episodes)
     begin = jax.random.randint(keys[2], (size, 1), 0, config.decisions - window + 1)
@@ -213,8 +230,14 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
     def state(time):
         return jax.tree.map(lambda leaf: leaf[group, episode, time], replay.state)
 
+    def task(time):
+        return jax.tree.map(lambda leaf: leaf[group, episode, time], replay.task)
+
+    believed, explained = task(seen), task(decoded)
     return Evidence(
         window=Transition(state(seen), replay.reward[group, episode, seen], state(seen + 1)),
+        base_task=base_task(believed),
+        same_task=believed.target[:, :, None] == explained.target[:, None],
         previous=state(decoded),
         action=replay.action[group, episode, decoded],
         reward=replay.reward[group, episode, decoded],

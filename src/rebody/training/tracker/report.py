@@ -3,8 +3,9 @@
 from dataclasses import asdict
 from pathlib import Path
 
+import jax
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool
 
 from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import follow
@@ -16,7 +17,7 @@ from rebody.tasks.figures import final_error
 from rebody.training.card import card
 from rebody.training.run import Run
 from rebody.training.tracker.config import TrackerConfig
-from rebody.types import Subgoal
+from rebody.types import DECISION_DT, GlobalState, Subgoal, Task
 
 COMMANDS = 100
 """Held-out commands per slot."""
@@ -33,11 +34,10 @@ def measure(tracker: Tracker, spec: RobotSpec) -> dict[str, float]:
     zeros = np.zeros(COMMANDS // 4)
     slot = np.repeat([GOAL, VELOCITY, GOAL, VELOCITY], [COMMANDS, COMMANDS, len(zeros), len(zeros)])
     value = np.concatenate([goals, speeds, zeros, zeros])
-    position, fell = _run(tracker, spec, slot.astype(np.int32), value.astype(np.float32))
-    errors = np.array([final_error(SLOTS[slot[i]], value[i], position[:, i]) for i in range(2 * COMMANDS)]).reshape(
-        2, COMMANDS
-    )
-    last_second = np.diff(position[-11:, 2 * COMMANDS :], axis=0) / 0.1
+    command = Subgoal(slot.astype(np.int32), value.astype(np.float32))
+    states, fell = _run(tracker, spec, command)
+    errors = final_error(Task(command.slot, command.value), states)[: 2 * COMMANDS].reshape(2, COMMANDS)
+    last_second = states.vx[-10:, 2 * COMMANDS :]
     return {
         "goal median": float(np.median(errors[0])),
         "goal p95": float(np.percentile(errors[0], 95)),
@@ -48,20 +48,18 @@ def measure(tracker: Tracker, spec: RobotSpec) -> dict[str, float]:
     }
 
 
-def _run(
-    tracker: Tracker, spec: RobotSpec, slot: Int[np.ndarray, " robot"], value: Float[np.ndarray, " robot"]
-) -> tuple[Float[np.ndarray, "decision robot"], Bool[np.ndarray, " robot"]]:
-    """x [m] after each decision, and which robots fell."""
-    batch = RobotBatch(spec, len(slot))
+def _run(tracker: Tracker, spec: RobotSpec, command: Subgoal) -> tuple[GlobalState, Bool[np.ndarray, " robot"]]:
+    """States after each decision, [decision, robot], and which robots fell."""
+    batch = RobotBatch(spec, len(command.slot))
     batch.reset(np.random.default_rng(0))
-    subgoal, positions = Subgoal(slot, value), []
-    fell = np.zeros(len(slot), bool)
-    for _ in range(round(SECONDS / 0.1)):
+    states, fell = [], np.zeros(len(command.slot), bool)
+    for _ in range(round(SECONDS / DECISION_DT)):
+        before = batch.qpos.copy()
         for _ in range(spec.steps_per_decision):
-            follow(TrackerController(tracker), batch, subgoal)
+            follow(TrackerController(tracker), batch, command)
             fell |= batch.fallen
-        positions.append(batch.x.copy())
-    return np.array(positions), fell
+        states.append(spec.observe(batch.qpos, before))
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *states), fell
 
 
 def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: Run, seed: int) -> Path:

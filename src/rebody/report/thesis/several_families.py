@@ -1,0 +1,136 @@
+"""Section 6.4.2 of the thesis: one module for goals and speeds, front and back."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from rebody.agents.parts import load_inference
+from rebody.evaluation.evaluate import Trial
+from rebody.report.style import BELIEF, MOTION, ORACLE, TRUTH, figure
+from rebody.report.thesis.data import Data, training_log, trajectories
+from rebody.report.thesis.panels import caption, draw_curve
+from rebody.tasks import GOAL, VELOCITY, base_task
+from rebody.tasks.task_file import TaskSpec
+from rebody.training.inference import PRESETS, train_inference
+from rebody.types import Task
+
+BASE_TASKS = {
+    2 * GOAL + 1: ("goal in front", "#b5403c"),
+    2 * GOAL: ("goal behind", "#2b6f9e"),
+    2 * VELOCITY + 1: ("run forward", "#e0a526"),
+    2 * VELOCITY: ("run backward", "#4f9a6b"),
+}
+"""Name and colour by the number that `base_task` gives."""
+EPISODES = 12
+"""Of each base task in a picture of latents."""
+SHOWN = 4
+"""Of each base task in a picture of ways."""
+FROM = 20
+"""First decision whose latent is shown."""
+EVERY = 6
+"""Decisions from one latent that is shown to the next."""
+
+
+# 6.13
+
+
+def training() -> Data:
+    """Of the shipped module."""
+    return training_log("goal-velocity", "inference")
+
+
+def train_again(runs: Path) -> Data:
+    """Of a module trained anew."""
+    out = runs / "goal-velocity"
+    train_inference(PRESETS["goal-velocity"](), out, 0, title="Inference: goal-velocity", resume=True)
+    return training_log(out, "inference")
+
+
+def draw_training(data: Data, path: Path, text: str) -> None:
+    """Return, sharpness, and clusters over toy steps."""
+    with figure(path, 2, 2, size=(11.0, 8.0)) as (drawing, (returns, errors, clusters, agreement)):
+        draw_curve(returns, data, "return", "training episodes", colour="#9dbbd3")
+        draw_curve(returns, data, "evaluation/return", "held-out tasks", dots=True)
+        draw_curve(returns, data, "evaluation/oracle return", "held-out tasks, told", colour=ORACLE, dots=True)
+        returns.set(ylabel="return over 20 s", ylim=(-300, 0))
+        for family, colour in (("goal", MOTION), ("velocity", BELIEF)):
+            draw_curve(errors, data, f"evaluation/{family} median", f"{family}, median", colour=colour, dots=True)
+        errors.set(ylabel="final error [m], [m/s]", yscale="log")
+        draw_curve(clusters, data, "mixture/components", "components", colour=TRUTH)
+        for move, colour in (("births", MOTION), ("merges", BELIEF)):
+            draw_curve(clusters, data, f"mixture/{move}", f"{move} in the iteration", colour=colour)
+        clusters.set(ylabel="clusters", ylim=(0, None))
+        draw_curve(agreement, data, "mixture/purity", "purity", colour=MOTION)
+        draw_curve(agreement, data, "mixture/ari", "adjusted Rand index", colour=BELIEF)
+        agreement.set(ylabel="agreement with base tasks", ylim=(0, 1.02))
+        for axes in (returns, errors, clusters, agreement):
+            axes.set_xlabel("toy steps [million]")
+            axes.legend(frameon=False, fontsize=8)
+        caption(drawing, text)
+
+
+# 6.14
+
+
+def on_toy() -> Data:
+    """`goal-velocity` on the toy."""
+    return trajectories(Trial("reuse", load_inference("goal-velocity"), None, None), _tasks())
+
+
+def projections() -> Data:
+    """Its latents in two dimensions: by t-SNE as in the thesis, and by PCA."""
+    # a second to import, which every command would wait for
+    from sklearn.decomposition import PCA
+    from sklearn.manifold import TSNE
+
+    data = on_toy()
+    latents = data["latent"][FROM::EVERY]
+    flat = latents.reshape(-1, latents.shape[-1])
+    return {name: data[name] for name in ("family", "target")} | {
+        "tsne": TSNE(random_state=0).fit_transform(flat).reshape(*latents.shape[:2], 2),
+        "pca": PCA(2).fit_transform(flat).reshape(*latents.shape[:2], 2).astype(np.float32),
+    }
+
+
+def _tasks() -> list[TaskSpec]:
+    """Evenly spaced over each base task."""
+    specs = []
+    for task in PRESETS["goal-velocity"]().tasks.base_tasks:
+        specs += [TaskSpec(task.family, float(target)) for target in np.linspace(task.low, task.high, EPISODES)]
+    return specs
+
+
+def draw_ways(data: Data, path: Path, text: str) -> None:
+    """Positions on goals, velocities on speeds."""
+    panels = ((GOAL, "position_m", "x [m]"), (VELOCITY, "velocity_m_s", "velocity [m/s]"))
+    with figure(path, 1, 2, size=(10.5, 4.4)) as (drawing, all_axes):
+        for axes, (family, series, label) in zip(all_axes, panels, strict=True):
+            for i in np.flatnonzero(data["family"] == family)[:: EPISODES // SHOWN]:
+                _, colour = BASE_TASKS[_labels(data)[i]]
+                axes.plot(data["time_s"], data[series][:, i], color=colour, lw=1.2)
+                axes.axhline(data["target"][i], color=colour, lw=0.8, ls=":")
+            axes.set(xlabel="time [s]", ylabel=label, xlim=(0, data["time_s"][-1]))
+        caption(drawing, text)
+
+
+def draw_projections(data: Data, path: Path, text: str) -> None:
+    """Latents of many decisions in two dimensions."""
+    with figure(path, 1, 2, size=(10.5, 5.2)) as (drawing, (tsne, pca)):
+        _draw_points(tsne, data["tsne"], _labels(data))
+        _draw_points(pca, data["pca"], _labels(data))
+        tsne.set(title="t-SNE")
+        pca.set(title="PCA")
+        tsne.legend(frameon=False, fontsize=8, markerscale=2)
+        caption(drawing, text)
+
+
+def _draw_points(axes: Axes, points: np.ndarray, labels: list[int]) -> None:
+    for number, (name, colour) in BASE_TASKS.items():
+        x, y = points[:, np.array(labels) == number].reshape(-1, 2).T
+        axes.plot(x, y, ".", color=colour, ms=3, label=name)
+    axes.set(xticks=[], yticks=[])
+
+
+def _labels(data: Data) -> list[int]:
+    return np.asarray(base_task(Task(data["family"], data["target"]))).tolist()

@@ -1,0 +1,184 @@
+"""What a meta-training run has reached, measured on the toy with tasks that it never trains on."""
+
+from dataclasses import dataclass
+
+import jax
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from rebody.agents.build import build_agent
+from rebody.agents.parts import Inference, InferenceParts
+from rebody.agents.rollout import Episodes, rollout_on_toy
+from rebody.bodies.toys import Toy, no_disturbance
+from rebody.inference.contract import Contract
+from rebody.inference.probe import Probe, fit_probe
+from rebody.tasks import base_task, family_index
+from rebody.tasks.figures import final_error
+from rebody.training.inference.clusters import agreement, draw, new_mixture
+from rebody.training.inference.config import MetaConfig
+from rebody.types import Task
+
+DECISIONS = 200
+BASE_TASK_AT = 10
+"""Decisions after which the base task (family and sign) should be known."""
+PROBED_FROM = 20
+"""A probe is fitted on the beliefs from this decision on."""
+SHARP_AT = 50
+"""Decisions after which a target should read out sharply, whatever disturbs the toy."""
+CLUSTERED = (2_000, 10_000)
+"""Beliefs of a fit of the mixture."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Held-out tasks and what was done on them."""
+
+    tasks: Task  # the active ones [time, episode]
+    episodes: Episodes
+
+    @property
+    def total_return(self) -> float:
+        """Mean over episodes of the summed reward."""
+        return float(self.episodes.reward.sum(0).mean())
+
+
+def measure(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
+    """Final errors [m, m/s, rad], return and the oracle's, and how sharply beliefs read out."""
+    probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
+    oracle = act("oracle", parts, toy, config, held_out)
+    return _errors(outcome, config) | {"oracle return": oracle.total_return} | _readings(probe, outcome, config)
+
+
+def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
+    """`measure`, and: the return with the exact posterior, sharpness on disturbed toys, changes of the task, and
+    clusters where there is a mixture."""
+    probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
+    figures = _errors(outcome, config)
+    for kind in ("bayes", "oracle"):
+        figures[f"{kind} return"] = act(kind, parts, toy, config, held_out).total_return
+    figures |= _readings(probe, outcome, config)
+    figures |= _sharpness(probe, act("reuse", parts, toy, config, held_out, disturbed=True), config)
+    figures |= _changes(probe, act("reuse", parts, toy, config, held_out, switch_share=1.0))
+    return figures | (_clusters(outcome, config) if config.prior == "mixture" else {})
+
+
+def act(
+    kind: str,
+    parts: InferenceParts,
+    toy: Toy,
+    config: MetaConfig,
+    held_out: int,
+    *,
+    seed: int = 2,
+    disturbed: bool = False,
+    switch_share: float = 0.0,
+) -> Outcome:
+    """An agent of a named kind on held-out tasks; the seeds are none that training uses."""
+    task_key, disturbance_key = jax.random.split(jax.random.fold_in(jax.random.key(2**31 - 1), seed))
+    tasks = config.tasks.sample_episodes(task_key, held_out, DECISIONS, switch_share)
+    tasks = jax.tree.map(lambda leaf: leaf.T, tasks)
+    rough = config.randomisation.sample(disturbance_key, (held_out,))
+    inference = Inference("in training", contract_of(config), parts, toy)
+    agent = build_agent(kind, inference, tasks, horizon=1)
+    episodes = rollout_on_toy(agent, toy, tasks, config.reward, rough if disturbed else no_disturbance((held_out,)))
+    return Outcome(*jax.tree.map(np.asarray, (tasks, episodes)))
+
+
+def contract_of(config: MetaConfig) -> Contract:
+    """What a module of these settings expects of a body."""
+    return Contract(
+        fields=config.inference.fields,
+        window=config.inference.window,
+        target_ranges=config.target_ranges,
+        reward=config.reward,
+    )
+
+
+def fit(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int, *, disturbed: bool = False) -> Probe:
+    """A probe of other episodes than those that figures are taken on."""
+    outcome = act("reuse", parts, toy, config, held_out, seed=3 if disturbed else 1, disturbed=disturbed)
+    latent = np.asarray(outcome.episodes.belief.mean)[PROBED_FROM:]
+    tasks = jax.tree.map(lambda leaf: leaf[PROBED_FROM:].ravel(), outcome.tasks)
+    return fit_probe(latent.reshape(-1, latent.shape[-1]), tasks.family, tasks.target)
+
+
+def _errors(outcome: Outcome, config: MetaConfig) -> dict[str, float]:
+    """Final errors of each family, and the return."""
+    errors = final_error(jax.tree.map(lambda leaf: leaf[-1], outcome.tasks), outcome.episodes.state)
+    figures = {}
+    for name, of_family in _by_family(outcome.tasks, config):
+        figures[f"{name} median"] = float(np.median(errors[of_family]))
+        figures[f"{name} p95"] = float(np.percentile(errors[of_family], 95))
+    return figures | {"return": outcome.total_return}
+
+
+def _readings(probe: Probe, outcome: Outcome, config: MetaConfig) -> dict[str, float]:
+    """Share of right base tasks, early and later on, and R^2 of each family's target."""
+    _, target = read(probe, outcome)
+    right = is_right(probe, outcome)
+    figures = {
+        "base task": float(right[BASE_TASK_AT - 1].mean()),
+        "base task later": float(right[PROBED_FROM:].mean()),
+    }
+    for name, of_family in _by_family(outcome.tasks, config):
+        wanted = outcome.tasks.target[PROBED_FROM:, of_family]
+        figures[f"{name} R2"] = float(1 - np.var(target[PROBED_FROM:, of_family] - wanted) / np.var(wanted))
+    return figures
+
+
+def _sharpness(probe: Probe, outcome: Outcome, config: MetaConfig) -> dict[str, float]:
+    """Median distance between the target that a disturbed toy's belief speaks of and the true one."""
+    _, target = read(probe, outcome)
+    apart = np.abs(target - outcome.tasks.target)[SHARP_AT]
+    return {f"{name} read, disturbed": float(np.median(apart[of])) for name, of in _by_family(outcome.tasks, config)}
+
+
+def _changes(probe: Probe, outcome: Outcome) -> dict[str, float]:
+    """Decisions until a new base task is read rightly (median; all that are left, where it never is), and how often a
+    right reading is lost again."""
+    label = base_task(outcome.tasks)
+    is_new = np.diff(label, axis=0) != 0
+    right = is_right(probe, outcome)
+    after = [right[t + 1 :, i] for t, i in np.argwhere(is_new)]
+    late = [int(np.argmax(of_change)) + 1 if of_change.any() else len(of_change) for of_change in after]
+    lost = right[:-1] & ~right[1:] & ~is_new
+    figures = {"false changes in 1000": 1000 * float(lost.mean())}
+    return figures | ({"decisions to a new base task": float(np.median(late))} if late else {})
+
+
+def _clusters(outcome: Outcome, config: MetaConfig) -> dict[str, float]:
+    """Clusters of beliefs after `PROBED_FROM` decisions, fitted anew, against base tasks and families."""
+    rng = np.random.default_rng(0)
+    belief = jax.tree.map(lambda leaf: leaf[PROBED_FROM:].reshape(-1, leaf.shape[-1]), outcome.episodes.belief)
+    latent, label = draw(belief, config, rng), np.asarray(base_task(outcome.tasks))[PROBED_FROM:].ravel()
+    figures = {}
+    for size in CLUSTERED:
+        chosen = rng.choice(len(latent), min(size, len(latent)), replace=False)
+        mixture = new_mixture(config.mixture, rng).fit(latent[chosen])
+        cluster = mixture.predict(latent[chosen])
+        agrees, of_families = agreement(cluster, label[chosen]), agreement(cluster, label[chosen] // 2)
+        figures |= {
+            f"K of {size} beliefs": float(mixture.n_components_),
+            f"purity of {size} beliefs": agrees["purity"],
+            f"ARI of {size} beliefs": agrees["ari"],
+            f"family purity of {size} beliefs": of_families["purity"],
+            f"family ARI of {size} beliefs": of_families["ari"],
+        }
+    return figures
+
+
+def read(probe: Probe, outcome: Outcome) -> tuple[Int[np.ndarray, "time episode"], Float[np.ndarray, "time episode"]]:
+    """Family and target that each belief speaks of."""
+    family, target = probe(outcome.episodes.belief)
+    return np.asarray(family), np.asarray(target)
+
+
+def is_right(probe: Probe, outcome: Outcome) -> Bool[np.ndarray, "time episode"]:
+    """Whether family and sign are read rightly from each belief."""
+    family, target = read(probe, outcome)
+    return (family == outcome.tasks.family) & (target * outcome.tasks.target > 0)
+
+
+def _by_family(tasks: Task, config: MetaConfig) -> list[tuple[str, Int[np.ndarray, " episode"]]]:
+    """Episodes of each family, by its name."""
+    return [(name, np.flatnonzero(tasks.family[-1] == family_index(name))) for name in config.target_ranges]

@@ -1,0 +1,56 @@
+"""Presets hang together: what is asked can be seen, reached, and held by the toy."""
+
+import jax
+import numpy as np
+import pytest
+
+from rebody.bodies.toys import make_toy, no_disturbance
+from rebody.tasks import FAMILIES
+from rebody.training.inference import PRESETS
+
+MOVES = {"mass-damper": {"x", "vx"}, "position": {"x", "vx"}, "full": {"x", "z", "pitch", "vx", "vz", "pitch_rate"}}
+SHOWN_BY = {"goal": "x", "velocity": "x", "stand": "pitch"}
+"""The field without which a family's reward could not be understood."""
+
+
+@pytest.fixture(params=PRESETS)
+def preset(request):
+    return PRESETS[request.param]()
+
+
+def test_encoder_and_policy_see_what_moves(preset):
+    inference = preset.inference
+    for fields, scales in ((inference.fields, inference.scales), (preset.policy_fields, preset.policy_scales)):
+        assert set(fields) <= MOVES[preset.toy]
+        assert len(fields) == len(scales)
+        assert {SHOWN_BY[family] for family in preset.target_ranges} <= set(fields)
+
+
+def test_tasks_can_be_done_by_the_toy(preset):
+    toy = make_toy(preset.toy)
+    assert set(preset.target_ranges) <= {family.name for family in FAMILIES}
+    for family, (low, high) in preset.target_ranges.items():
+        assert low < high
+        far = max(abs(low), abs(high))
+        if family == "velocity":
+            assert far <= toy.max_force / toy.damping
+        if family == "stand":
+            assert far < toy.max_pitch
+        if family == "goal":  # episodes begin on either side of every goal
+            assert far <= preset.start[0]
+
+
+def test_a_split_latent_has_room_for_amounts(preset):
+    assert 0 <= preset.inference.kinds < preset.inference.latent
+    assert preset.clustered == (preset.inference.kinds or preset.inference.latent)
+    assert preset.inference.window is None or preset.inference.window <= preset.decisions
+
+
+@pytest.mark.parametrize(("name", "variance"), [("0", 0.0), ("0.1", 0.1), ("0.2", 0.2)])
+def test_noise_takes_the_place_of_all_disturbances(name, variance):
+    noisy = PRESETS[f"goal-velocity-noise-{name}"]()
+    assert noisy.observation_noise == variance
+    drawn, nominal = noisy.randomisation.sample(jax.random.key(0), (50,)), no_disturbance((50,))
+    for part in ("ripple_amplitude", "pitch_ripple", "lag", "gain", "state_noise"):
+        np.testing.assert_array_equal(getattr(drawn, part), getattr(nominal, part))
+    assert noisy.tasks == PRESETS["goal-velocity"]().tasks
