@@ -15,17 +15,8 @@ from pathlib import Path
 
 from inference import figures_of, show
 
-BUDGET = [
-    "--wander-iterations",
-    "15",
-    "--joint-iterations",
-    "20",
-    "--policy-iterations",
-    "10",
-    "--sac.decay-updates",
-    "40000",
-]
-CALM = ["--randomisation.ripple-amplitude", "0", "--randomisation.lag", "0", "--randomisation.gain", "1", "1"]
+BUDGET = "--wander-iterations 15 --joint-iterations 25 --sac.decay-updates 26000"
+CALM = "--randomisation.ripple-amplitude 0 --randomisation.lag 0 --randomisation.gain 1 1"
 VARIANTS = {
     "as shipped": "",
     "labelled": "--inference.label-weight 0.05",
@@ -36,9 +27,9 @@ VARIANTS = {
     "window 64": "--inference.window 64",
     "carried state": "--inference.window None --inference.batch-size 8",
     "no changes of the task": "--switch-share 0",
-    "not randomised": " ".join(CALM),
-    "observation noise 0.1": " ".join([*CALM, "--observation-noise 0.1"]),
-    "observation noise 0.2": " ".join([*CALM, "--observation-noise 0.2"]),
+    "not randomised": CALM,
+    "observation noise 0.1": f"{CALM} --observation-noise 0.1",
+    "observation noise 0.2": f"{CALM} --observation-noise 0.2",
 }
 
 
@@ -50,18 +41,18 @@ def main() -> None:
     rows = {}
     for name in arguments.only:
         out = arguments.out / name.replace(" ", "-").replace("=", "")
-        train(VARIANTS[name].split(), out)
+        train(VARIANTS[name], out)
         minutes = json.loads((out / "config.json").read_text())["training"]["wall_s"] / 60
         rows[name] = {"training [min]": minutes} | figures_of(str(out))
     show(rows)
 
 
-def train(flags: list[str], out: Path) -> None:
+def train(flags: str, out: Path) -> None:
     """Train a variant, or go on with it."""
     if (out / "card.md").exists():
         return
     rebody = Path(sys.executable).with_name("rebody")
-    command = [rebody, "train", "inference", "--preset", "goal-velocity", "--out", out, *BUDGET, *flags]
+    command = [rebody, "train", "inference", "--preset", "goal-velocity", "--out", out, *BUDGET.split(), *flags.split()]
     if (out / "checkpoint").exists():
         command.append("--resume")
     subprocess.run([str(part) for part in command], check=True)

@@ -7,14 +7,14 @@ An artifact is a shipped name or a folder; its own card says which preset made i
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from rebody.agents.parts import load_inference
 from rebody.store import load_artifact
 from rebody.training.inference import PRESETS
 from rebody.training.inference.measure import measure_in_depth
-
-HELD_OUT = 500
+from rebody.training.inference.report import HELD_OUT
 
 
 def main() -> None:
@@ -31,8 +31,11 @@ def main() -> None:
 def figures_of(name: str) -> dict[str, float]:
     """The figures of one artifact on the tasks of the preset that made it."""
     module = load_inference(name)
-    preset = load_artifact(name, "inference").card.splitlines()[0].split()[-1]
-    return measure_in_depth(module.parts, module.toy, PRESETS[preset](), HELD_OUT)
+    preset = PRESETS[load_artifact(name, "inference").card.splitlines()[0].split()[-1]]()
+    encoder = module.parts.module.encoder  # a variant may have another latent than its preset
+    inference = replace(preset.inference, latent=encoder.latent, kinds=encoder.kinds, window=encoder.window)
+    prior = "gaussian" if module.parts.mixture is None else "mixture"
+    return measure_in_depth(module.parts, module.toy, replace(preset, inference=inference, prior=prior), HELD_OUT)
 
 
 def show(rows: dict[str, dict[str, float]]) -> None:

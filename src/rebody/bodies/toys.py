@@ -159,7 +159,7 @@ class MassDamper(Toy):
         disturbance = state.disturbance
         noise = disturbance.state_noise * jax.random.normal(key, (2, *state.x.shape))
         wanted = disturbance.gain * self.max_force * jnp.clip(action[..., 0], -1.0, 1.0)
-        force = follow(state.force, wanted, disturbance.lag)
+        force = _follow(state.force, wanted, disturbance.lag)
         acceleration = (force - self.damping * state.drift) / self.mass
         drift = state.drift + DECISION_DT * acceleration + noise[0]
         return _move(state, drift, force, noise[1])
@@ -218,7 +218,7 @@ class FullToy(MassDamper):
 
     def _turned(self, state: ToyState, share: Float[AnyArray, "*batch"]):
         wanted = state.disturbance.gain * self.max_torque * jnp.clip(share, -1.0, 1.0)
-        torque = follow(state.torque, wanted, state.disturbance.lag)
+        torque = _follow(state.torque, wanted, state.disturbance.lag)
         righting = self.turn_damping * state.turn + self.stiffness * state.pitch
         return state.turn + DECISION_DT * (torque - righting) / self.inertia, torque
 
@@ -228,7 +228,7 @@ class FullToy(MassDamper):
         return replace(toy, z=state.z, vz=state.vz, pitch_rate=state.pitch_rate, turn=state.pitch_rate)
 
 
-def follow(
+def _follow(
     value: Float[AnyArray, "*batch"], wanted: Float[AnyArray, "*batch"], lag: Float[AnyArray, "*batch"]
 ) -> Float[AnyArray, "*batch"]:
     """One decision of a first-order lag [s]."""

@@ -227,21 +227,18 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
     seen = begin + jnp.arange(window)
     decoded = jax.random.randint(keys[4], (size, config.inference.decoded), 0, config.decisions)
 
-    def state(time):
-        return jax.tree.map(lambda leaf: leaf[group, episode, time], replay.state)
+    def at(time, along):
+        return jax.tree.map(lambda leaf: leaf[group, episode, time], along)
 
-    def task(time):
-        return jax.tree.map(lambda leaf: leaf[group, episode, time], replay.task)
-
-    believed, explained = task(seen), task(decoded)
+    believed, explained = at(seen, replay.task), at(decoded, replay.task)
     return Evidence(
-        window=Transition(state(seen), replay.reward[group, episode, seen], state(seen + 1)),
+        window=Transition(at(seen, replay.state), at(seen, replay.reward), at(seen + 1, replay.state)),
         base_task=base_task(believed),
         same_task=believed.target[:, :, None] == explained.target[:, None],
-        previous=state(decoded),
-        action=replay.action[group, episode, decoded],
-        reward=replay.reward[group, episode, decoded],
-        state=state(decoded + 1),
+        previous=at(decoded, replay.state),
+        action=at(decoded, replay.action),
+        reward=at(decoded, replay.reward),
+        state=at(decoded + 1, replay.state),
     )
 
 
