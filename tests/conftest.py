@@ -24,6 +24,7 @@ import pytest  # noqa: E402
 
 from rebody.agents.parts import Inference, LoadedFlat, LoadedTracker, inference_template  # noqa: E402
 from rebody.bodies import load_robot  # noqa: E402
+from rebody.bodies.robot import Reach  # noqa: E402
 from rebody.bodies.toys import MassDamper  # noqa: E402
 from rebody.cli.main import run  # noqa: E402
 from rebody.control.flat import FlatPolicy  # noqa: E402
@@ -81,7 +82,7 @@ def lively_actor(observations: int, seed: int) -> Actor:
 
 @pytest.fixture(scope="session")
 def tracker():
-    return Tracker(lively_actor(JOINTS + 6, 1), 5.0, 3.0)
+    return Tracker(lively_actor(JOINTS + 6, 1), Reach(speed=(-3.0, 3.0)))
 
 
 @pytest.fixture(scope="session")

@@ -207,7 +207,7 @@ def test_an_agent_that_there_is_not(inference):
 
 
 def test_reuse_of_several_families_acts_by_the_policy_on_the_point_mass(inference):
-    """What it would say to a robot it may not say; `check_fit` sees to that."""
+    """A point mass has no slots, so nothing has to choose one."""
     contract = replace(inference.contract, target_ranges={"goal": (-1.0, 1.0), "velocity": (-1.0, 1.0)})
     command = say(build_agent("reuse", replace(inference, contract=contract)), STATE, BELIEF, FIRST)
     np.testing.assert_allclose(command.action, inference.parts.high_level(STATE, BELIEF), rtol=1e-5)
@@ -251,8 +251,9 @@ def test_a_subgoal_to_stand_is_the_pitch_that_the_full_toy_would_have(standing):
     state = replace(STATE, pitch=np.array([0.3, -1.0, 0.0], "f4"), pitch_rate=np.array([1.0, 0.0, -2.0], "f4"))
     command = say(build_agent("reuse", standing, horizon=4), state, BELIEF, FIRST)
     pitch, turn = np.array(state.pitch), np.array(state.pitch_rate)
+    said = standing.parts.module.decoder.interpret(BELIEF)
     for _ in range(4):
-        observation = np.concatenate([np.stack([pitch / 10.0, turn / 3.5], axis=-1), BELIEF_FEATURES], axis=-1)
+        observation = np.concatenate([np.stack([pitch / 10.0, turn / 3.5], axis=-1), said.features()], axis=-1)
         torque = 6.0 * np.asarray(standing.parts.high_level.actor(observation.astype(np.float32)))[:, 2]
         turn = turn + 0.1 * (torque - 4.0 * turn - 4.0 * pitch)
         pitch = pitch + 0.1 * turn

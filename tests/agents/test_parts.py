@@ -1,7 +1,5 @@
 """From artifacts to parts: what is loaded acts as what was saved."""
 
-from dataclasses import replace
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -10,11 +8,13 @@ import pytest
 
 from rebody.agents.build import AGENTS, check_fit
 from rebody.agents.parts import inference_template, load_flat, load_inference, load_tracker
+from rebody.bodies.robot import Reach
 from rebody.bodies.toys import FullToy, MassDamper, PositionToy, describe_toy
 from rebody.errors import RebodyError
 from rebody.store import save_artifact, tree_hash, tree_to_arrays
 
 X = np.linspace(-3, 3, 5, dtype=np.float32)
+SLOTS = ("goal", "velocity")
 
 
 @pytest.fixture
@@ -69,13 +69,13 @@ def test_a_contract_of_another_version_is_refused(saved):
 def test_a_loaded_tracker_acts_as_the_saved_one(tracker, tmp_path):
     config = {
         "robot": "cheetah", "observations": 23, "actions": 6, "hidden": [8], "projections": 0,
-        "max_distance": 5.0, "max_speed": 3.0,
+        "reach": {"distance": 5.0, "speed": [-1.0, 3.0], "pitch": None},
     }  # fmt: skip
     save_artifact(tmp_path / "t", kind="tracker", config=config, weights=tracker, card="# Tiny\n", log="")
     loaded = load_tracker(str(tmp_path / "t"))
     observation = jax.random.normal(jax.random.key(0), (4, 23))
     np.testing.assert_array_equal(loaded.tracker.actor(observation), tracker.actor(observation))
-    assert (loaded.robot, loaded.tracker.max_distance, loaded.tracker.max_speed) == ("cheetah", 5.0, 3.0)
+    assert (loaded.robot, loaded.tracker.reach) == ("cheetah", Reach(speed=(-1.0, 3.0), distance=5.0))
     with pytest.raises(RebodyError):
         load_inference(str(tmp_path / "t"))
 
@@ -120,7 +120,8 @@ def test_a_module_is_loaded_with_its_mixture(kinds, stored_config, tmp_path):
     np.testing.assert_allclose(
         loaded.parts.mixture.responsibilities(latent), parts.mixture.responsibilities(latent), rtol=1e-6
     )
-    assert loaded.parts.high_level.actor(jnp.zeros((1, 2 + 2 * 5))).shape == (1, 3)
+    believed = 2 if kinds else 5  # a split belief is seen as the share and the reference of the one field
+    assert loaded.parts.high_level.actor(jnp.zeros((1, 2 + 2 * believed))).shape == (1, 3)
 
 
 def test_a_module_of_before_there_were_mixtures_has_none(saved, stored_config):
@@ -130,18 +131,12 @@ def test_a_module_of_before_there_were_mixtures_has_none(saved, stored_config):
 
 def test_check_fit_names_the_robot(inference):
     for kind in AGENTS:
-        check_fit(kind, inference, "cheetah", ("x", "vx"))
+        check_fit(kind, inference, "cheetah", ("x", "vx"), SLOTS)
         with pytest.raises(RebodyError, match="sees x, which 'gripper' does not have"):
-            check_fit(kind, inference, "gripper", ("z",))
+            check_fit(kind, inference, "gripper", ("z",), SLOTS)
 
-
-def test_on_robots_reuse_is_for_modules_of_one_family(inference):
-    contract = replace(inference.contract, target_ranges={"goal": (-1.0, 1.0), "velocity": (-1.0, 1.0)})
-    several = replace(inference, contract=contract)
-    for kind in set(AGENTS) - {"reuse"}:
-        check_fit(kind, several, "cheetah", ("x", "vx"))
-    with pytest.raises(RebodyError, match=r"'tiny' tells several families apart.*On a point mass it can"):
-        check_fit("reuse", several, "cheetah", ("x", "vx"))
+        with pytest.raises(RebodyError, match="no slot for goal"):
+            check_fit(kind, inference, "cheetah", ("x", "vx"), ("velocity",))
 
 
 def test_the_tiny_parts_are_not_all_alike(inference):

@@ -16,6 +16,7 @@ from rebody.agents.live import LiveAgent
 from rebody.agents.parts import LoadedTracker
 from rebody.agents.rollout import begin, decide, joint_action, rollout_on_robot, rollout_on_toy
 from rebody.bodies import RobotBatch
+from rebody.bodies.robot import Fall, RobotSpec
 from rebody.errors import RebodyError
 from rebody.store import tree_hash
 from rebody.tasks import GOAL, reward
@@ -93,9 +94,9 @@ def test_a_goal_is_made_relative_anew_at_every_control_step(run, monkeypatch):
     """Trap 2: a constant relative goal would be chased for ever."""
     x_before, told = [0.0], []
 
-    def spy(controller, joints, x, subgoal, belief):
+    def spy(controller, joints, x, pitch, subgoal, belief):
         told.append((float(x[0]), float(subgoal.value[0])))
-        return joint_action(controller, joints, x, subgoal, belief)
+        return joint_action(controller, joints, x, pitch, subgoal, belief)
 
     monkeypatch.setattr(rollout, "joint_action", spy)
     run(on_frame=lambda batch, subgoal: x_before.append(batch.qpos[0, 0]))
@@ -126,16 +127,17 @@ def test_an_episode_does_not_depend_on_those_beside_it(run, episodes, i):
 
 
 def test_a_fallen_robot_keeps_scoring(run, cheetah):
-    spec = replace(cheetah, has_fallen=lambda height, pitch: height > -1e9, fall_duration=0.1)
+    spec = replace(cheetah, fall=Fall(min_height=1e9, lasts_s=0.1))
     episodes = run(spec=spec)
     assert episodes.fell.all()
     assert episodes.reward.shape == (WINDOW, 3)
     assert (episodes.reward < -1).all()
 
 
-def test_a_robot_that_gets_up_again_fell(run, cheetah):
+def test_a_robot_that_gets_up_again_fell(run, cheetah, monkeypatch):
     looks = iter([False, True, True] + [False] * 20)
-    spec = replace(cheetah, has_fallen=lambda height, pitch: np.full(height.shape, next(looks)), fall_duration=0.1)
+    monkeypatch.setattr(RobotSpec, "lies", lambda spec, qpos: np.full(len(qpos), next(looks)))
+    spec = replace(cheetah, fall=Fall(lasts_s=0.1))
     assert run(spec=spec).fell.all()
 
 

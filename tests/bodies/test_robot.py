@@ -1,6 +1,7 @@
 """Robots move as Gymnasium's do, the same for any number of threads, and say when something is wrong."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium
 import mujoco
@@ -12,6 +13,7 @@ from rebody.bodies.robot import wrap_angle
 from rebody.errors import RebodyError
 
 STEPS = 60
+ANT = str(Path(__file__).parents[2] / "examples" / "ant" / "ant.toml")
 
 
 def batch_of(spec, size, threads=1, seed=0):
@@ -20,8 +22,8 @@ def batch_of(spec, size, threads=1, seed=0):
     return batch
 
 
-def actions_of(size, steps=STEPS, seed=1):
-    return np.random.default_rng(seed).uniform(-1, 1, (steps, size, 6)).astype(np.float32)
+def actions_of(size, steps=STEPS, seed=1, actuators=6):
+    return np.random.default_rng(seed).uniform(-1, 1, (steps, size, actuators)).astype(np.float32)
 
 
 def roll(batch, actions):
@@ -33,16 +35,20 @@ def roll(batch, actions):
     return np.stack(history)
 
 
-def test_moves_bit_for_bit_as_gymnasiums(cheetah, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("name", "theirs"), [("cheetah", "HalfCheetah-v5"), ("hopper", "Hopper-v5"), ("walker", "Walker2d-v5")]
+)
+def test_moves_bit_for_bit_as_gymnasiums(name, theirs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo leaves its log of the model's deprecated attribute there
-    env = gymnasium.make("HalfCheetah-v5").unwrapped
+    spec = load_robot(name)
+    env = gymnasium.make(theirs, frame_skip=spec.frame_skip).unwrapped
     env.reset(seed=3)
-    batch = batch_of(cheetah, 1)
+    batch = batch_of(spec, 1)
     kind = mujoco.mjtState.mjSTATE_INTEGRATION
     state = np.zeros(mujoco.mj_stateSize(env.model, kind))
     mujoco.mj_getState(env.model, env.data, state, kind)
     batch.state = state[None]
-    for action in actions_of(1):
+    for action in actions_of(1, actuators=spec.model.nu):
         env.step(action[0])
         batch.step(action)
         np.testing.assert_array_equal(batch.qpos[0], env.data.qpos)
@@ -138,6 +144,83 @@ def test_compiling_the_model_is_silent_and_leaves_no_log(cheetah, capfd, tmp_pat
     assert not list(tmp_path.iterdir())
 
 
-def test_unknown_robot():
-    with pytest.raises(RebodyError, match=r"did you mean 'cheetah'\?"):
-        load_robot("chetah")
+@pytest.mark.parametrize("name", ["cheetah", "hopper", "walker"])
+def test_a_push_changes_the_speed_of_the_centre_of_mass_by_what_it_says(name):
+    batch = batch_of(load_robot(name), 3)
+    roll(batch, actions_of(3, 10, actuators=batch.spec.model.nu))  # so that all parts move
+    before, change = batch.qvel.copy(), np.array([0.3, 0.0, -2.0])
+    speeds = [centre_of_mass_velocity(batch, qvel) for qvel in (before, pushed(batch, change))]
+    np.testing.assert_allclose(speeds[1] - speeds[0], np.outer(change, [1, 0, 0]), atol=1e-12)
+
+
+def pushed(batch, change):
+    batch.push(change)
+    return batch.qvel
+
+
+def centre_of_mass_velocity(batch, qvel):
+    """Of the robot alone [m/s]."""
+    model, found = batch.spec.model, []
+    data = mujoco.MjData(model)
+    for data.qpos[:], data.qvel[:] in zip(batch.qpos, qvel, strict=True):
+        mujoco.mj_forward(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        found.append(data.subtree_linvel[0].copy())
+    return np.array(found)
+
+
+# a body that floats freely, held to the plane
+
+
+def thrown(spec, steps):
+    """x, z and pitch, and all other joints, after each control step of the body itself and of the one held."""
+    free = mujoco.MjModel.from_xml_path(str(spec.mjcf))
+    data, batch = mujoco.MjData(free), RobotBatch(spec, 1, threads=1)
+    batch.reset(np.random.default_rng(0))
+    batch.qpos[:], batch.qvel[:] = spec.model.qpos0, 0.0
+    batch.qpos[0, 1] += 3.0
+    data.qpos[2] += 3.0
+    batch.qvel[0, :3] = data.qvel[[0, 2, 4]] = 1.5, 2.0, 3.0
+    held, floating = [], []
+    for _ in range(steps):
+        batch.step(np.zeros((1, spec.model.nu)))
+        mujoco.mj_step(free, data, spec.frame_skip)
+        held.append(batch.qpos[0].copy())
+        x, y, z, turned, sideways, pitch, yaw, *others = data.qpos
+        np.testing.assert_allclose([y, sideways, yaw], 0.0, atol=1e-9)  # it stays in the plane of its own accord
+        floating.append([x, z - free.qpos0[2], 2 * np.arctan2(pitch, turned), *others])
+    return np.array(held), np.array(floating)
+
+
+def test_an_ant_held_to_the_plane_flies_as_a_free_one():
+    spec = load_robot(ANT)
+    held, floating = thrown(spec, 8)
+    np.testing.assert_allclose(held, floating, atol=1e-4)
+    np.testing.assert_allclose(floating[-1, :3], [0.67, 3.03, 1.35], atol=0.01)  # it did fly and turn
+    assert spec.torso_height == 0.75
+
+
+DEFAULTS = ("<default>", '<default><joint damping="2" armature="1" {more}/>')
+
+
+def test_what_a_model_says_of_its_joints_does_not_hold_it_to_the_plane(write_own):
+    old, new = DEFAULTS
+    held, floating = thrown(load_robot(write_own(mjcf=[(old, new.format(more=""))])), 8)
+    np.testing.assert_allclose(held, floating, atol=2e-3)
+
+
+@pytest.mark.xfail(reason="stiffness and friction of a model's default joint reach the joints of the plane")
+@pytest.mark.parametrize("more", ['stiffness="30"', 'frictionloss="5"'])
+def test_no_spring_and_no_friction_holds_it_to_the_plane(write_own, more):
+    old, new = DEFAULTS
+    held, floating = thrown(load_robot(write_own(mjcf=[(old, new.format(more=more))])), 8)
+    np.testing.assert_allclose(held, floating, atol=2e-3)
+
+
+def test_an_ant_reads_out_relative_to_its_rest_pose():
+    spec = load_robot(ANT)
+    batch = batch_of(spec, 2)
+    batch.qpos[:] = spec.model.qpos0
+    state = spec.observe(batch.qpos + np.eye(1, spec.model.nq, 1) * 0.2, batch.qpos)
+    np.testing.assert_allclose([state.x, state.z, state.vz], np.outer([0.0, 0.2, 2.0], [1, 1]), atol=1e-6)
+    assert spec.joint_state(batch.qpos, batch.qvel).shape == (2, 2 + 8 + 3 + 8)

@@ -29,14 +29,16 @@ def test_list_names_whatever_there_is(capsys: pytest.CaptureFixture[str]):
     assert run(["list"]) == 0
     printed = capsys.readouterr().out
     for name in (
-        "point-mass", "cheetah", "goal", "velocity", "readout", "bayes", "position-thesis", "tracker-cheetah", "6.9",
+        "point-mass", "cheetah", "hopper", "walker", "goal", "velocity", "readout", "bayes", "position-thesis",
+        "tracker-cheetah", "6.9",
     ):  # fmt: skip
         assert name in printed
 
 
 def test_the_shipped_module_finds_hidden_goals_on_the_cheetah(tasks: Path, tmp_path: Path):
     out = tmp_path / "results" / "cheetah.json"
-    assert run(["evaluate", "--tasks", str(tasks), "--seeds", "2", "--seconds", "10", "--json", str(out)]) == 0
+    words = ["--inference", "position", "--tasks", str(tasks), "--seeds", "2", "--seconds", "10", "--json", str(out)]
+    assert run(["evaluate", *words]) == 0
     results = json.loads(out.read_text())
     assert (results["robot"], results["agent"], results["inference"]) == ("cheetah", "reuse", "position")
     assert (results["decision_dt"], results["control_dt"]) == (0.1, 0.05)
@@ -49,7 +51,8 @@ def test_the_shipped_module_finds_hidden_goals_on_the_cheetah(tasks: Path, tmp_p
 
 def test_the_shipped_module_finds_hidden_goals_on_the_point_mass(tasks: Path, tmp_path: Path):
     out = tmp_path / "toy.json"
-    assert run(["evaluate", "--robot", "point-mass", "--tasks", str(tasks), "--json", str(out)]) == 0
+    words = ["--inference", "position", "--robot", "point-mass", "--tasks", str(tasks), "--json", str(out)]
+    assert run(["evaluate", *words]) == 0
     episodes = json.loads(out.read_text())["episodes"]
     assert max(episode["final_error"] for episode in episodes) < 0.15
     assert all(abs(episode["inferred_target"][-1] - episode["target"]) < 0.15 for episode in episodes)
@@ -74,7 +77,7 @@ def test_run_draws_an_episode(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (["run", "--task", "goal=1", "--agent", "magic"], "Agents are: reuse, readout, bayes, oracle, flat, idle"),
         (["run", "--task", "goal=1", "--stride", "0"], "--stride must be at least 1"),
         (["run", "--task", "goal=1", "--seconds", "1"], "too short"),
-        (["run", "--task", "velocity=1"], "cannot infer 'velocity'"),
+        (["run", "--task", "velocity=1", "--inference", "position"], "cannot infer 'velocity'"),
         (["run", "--task", "goal=1", "--robot", "point-mass", "--agent", "flat"], "a point mass has none"),
         (["run", "--task", "goal=1", "--agent", "oracle", "--thesis"], "thesis mode is for the agents reuse, readout"),
         (["run", "--task", "goal=1", "--agent", "flat", "--flat", "tracker-cheetah"], "'flat' is needed"),
@@ -83,6 +86,13 @@ def test_run_draws_an_episode(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (["figure", "6.3", "7"], "there is no figure '7'. Figures are:"),
         (["evaluate", "--tasks", "nowhere.json"], "no task file"),
         (["train", "inference", "--preset", "positions", "--out", "x"], "Presets are: position"),
+        (["train", "tracker", "--robot", "hoper", "--out", "x"], "did you mean 'hopper'"),
+        (["robot", "check", "hoper"], "Robots are: cheetah, hopper, walker, or the path of a robot's TOML file"),
+        (["robot", "check", "none.toml"], "cannot read the robot's file 'none.toml'"),
+        (["stress", "--robot", "./none.toml"], "cannot read the robot's file 'none.toml'"),
+        (["stress", "--episodes", "0"], "--episodes must be at least 1"),
+        (["stress", "--robot", "hopper", "--tracker", "tracker-cheetah"], "trained on 'cheetah', not on 'hopper'"),
+        (["stress", "--robot", "cheetah", "--tracker", "position"], "'tracker' is needed"),
     ],
 )
 def test_what_the_user_can_mend_is_one_message(arguments, says, capsys, tmp_path, monkeypatch):

@@ -1,25 +1,47 @@
 """What a tracker is told and what it is paid for."""
 
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
 
+from rebody.bodies.robot import Reach
 from rebody.control.sac import Actor, SACConfig
-from rebody.control.tracker import SLOTS, Command, Tracker, TrackerReward, tracker_observation, tracker_reward
-from rebody.tasks import GOAL, VELOCITY, family_names
+from rebody.control.tracker import (
+    MARGIN,
+    Command,
+    Motion,
+    Tracker,
+    TrackerReward,
+    after,
+    relative,
+    slots_of,
+    tracker_observation,
+    tracker_reward,
+)
+from rebody.tasks import GOAL, STAND, VELOCITY, family_names
+from rebody.types import Subgoal
 
 FAR, FAST = 5.0, 3.0
+REACH = Reach(speed=(-FAST / MARGIN, FAST / MARGIN), distance=FAR / MARGIN)
 CONTROL_DT = 0.05
 JOINTS = np.linspace(-1, 1, 4).astype(np.float32)
 
 
 def observe(slot, value):
-    return tracker_observation(JOINTS, command(slot, np.asarray(value)), FAR, FAST)[len(JOINTS) :]
+    return tracker_observation(JOINTS, command(slot, np.asarray(value)), REACH)[len(JOINTS) :]
 
 
 def command(slot, value):
     value = np.asarray(value, np.float32)
     return Command(np.full(value.shape, slot), value)
+
+
+def motion(displacement, turn=0.0, pitch=0.0, fell=False):
+    displacement = np.asarray(displacement, np.float32)
+    turn, pitch = (np.full_like(displacement, value) for value in (turn, pitch))
+    return Motion(displacement, turn, pitch, np.full(displacement.shape, fell))
 
 
 def pay(slot, value, displacement, pitch=0.0, action=0.0, control_dt=CONTROL_DT):
@@ -28,22 +50,22 @@ def pay(slot, value, displacement, pitch=0.0, action=0.0, control_dt=CONTROL_DT)
     return np.asarray(
         tracker_reward(
             command(slot, np.full_like(displacement, value)),
-            displacement,
+            motion(displacement, pitch=pitch),
             control_dt,
-            np.full_like(displacement, pitch),
             np.full((*displacement.shape, 6), action, np.float32),
+            REACH,
             TrackerReward(),
         )
     )
 
 
-def test_slots_are_families():
-    assert set(SLOTS) <= set(family_names())
-    assert (SLOTS.index("goal"), SLOTS.index("velocity")) == (GOAL, VELOCITY)
+def test_slots_are_the_first_families():
+    assert slots_of(REACH) == family_names()[:2]
+    assert slots_of(replace(REACH, pitch=(-1.0, 1.0))) == family_names()[:3]
 
 
 def test_joint_state_comes_first_and_unchanged():
-    observation = tracker_observation(JOINTS, command(GOAL, 2.0), FAR, FAST)
+    observation = tracker_observation(JOINTS, command(GOAL, 2.0), REACH)
     np.testing.assert_array_equal(observation[: len(JOINTS)], JOINTS)
     assert len(observation) == len(JOINTS) + 6
 
@@ -62,7 +84,7 @@ def test_commands_beyond_the_trained_range_are_cut_to_it(slot, bound):
     np.testing.assert_array_equal(observe(slot, 100.0), observe(slot, bound))
     np.testing.assert_array_equal(observe(slot, -100.0), observe(slot, -bound))
     assert np.abs(observe(slot, 0.9 * bound) - observe(slot, bound)).max() > 0.05
-    tracker = Tracker(Actor(10, 6, SACConfig(hidden=(8,)), jax.random.key(0)), FAR, FAST)
+    tracker = Tracker(Actor(10, 6, SACConfig(hidden=(8,)), jax.random.key(0)), REACH)
     np.testing.assert_array_equal(tracker(JOINTS, command(slot, 100.0)), tracker(JOINTS, command(slot, bound)))
 
 
@@ -118,5 +140,66 @@ def test_posture_and_energy_cost_the_same_in_both_slots():
 def test_a_batch_holds_both_slots():
     both = Command(np.array([GOAL, VELOCITY]), np.array([0.1, 2.0], np.float32))
     moved = np.array([0.1, 0.1], np.float32)  # onto the goal; at 2 m/s
-    paid = tracker_reward(both, moved, CONTROL_DT, 0 * moved, np.zeros((2, 6), np.float32), TrackerReward())
+    paid = tracker_reward(both, motion(moved), CONTROL_DT, np.zeros((2, 6), np.float32), REACH, TrackerReward())
     np.testing.assert_allclose(paid, [0.5, 0.0], atol=1e-6)
+
+
+# a goal is a point in the world, a pitch is one in space, and a speed is neither
+
+SUBGOAL = Subgoal(np.array([GOAL, VELOCITY, STAND]), np.array([4.0, 1.5, 0.5], np.float32))
+
+
+def test_a_goal_comes_nearer_as_the_robot_moves():
+    """Trap 2: no constant relative goal to chase for ever."""
+    seen = [np.asarray(relative(SUBGOAL, np.full(3, x), np.full(3, 0.2)).value) for x in (0.0, 3.0, 5.5)]
+    np.testing.assert_allclose(seen, [[4.0, 1.5, 0.3], [1.0, 1.5, 0.3], [-1.5, 1.5, 0.3]], atol=1e-6)
+
+
+def test_after_a_motion_a_subgoal_is_seen_from_where_the_robot_is_then():
+    x, pitch = np.full(3, 1.0, np.float32), np.full(3, -0.3, np.float32)
+    moved = motion(np.full(3, 0.07), turn=0.11)
+    seen = after(relative(SUBGOAL, x, pitch), moved)
+    np.testing.assert_allclose(seen.value, relative(SUBGOAL, x + 0.07, pitch + 0.11).value, atol=1e-6)
+
+
+STANDS = replace(REACH, pitch=(-1.0, 1.0))
+
+
+def test_reward_of_a_pitch_peaks_on_it_however_far_the_robot_lies():
+    turns = np.linspace(-0.5, 0.5, 101).astype(np.float32)
+    told, action = command(STAND, np.full_like(turns, 0.2)), np.zeros((101, 6), np.float32)
+    still = np.zeros_like(turns)
+    for pitch in (0.0, 1.0):
+        moved = Motion(still, turns, still + pitch, still > 0)
+        paid = np.asarray(tracker_reward(told, moved, CONTROL_DT, action, STANDS, TrackerReward()))
+        assert turns[paid.argmax()] == pytest.approx(0.2, abs=1e-6)
+        assert paid.max() == pytest.approx(TrackerReward().arrival, abs=1e-5)
+
+
+def test_a_third_slot_shows_beside_the_others():
+    observation = tracker_observation(JOINTS, command(STAND, 0.3), STANDS)[len(JOINTS) :]
+    np.testing.assert_array_equal(observation[:3], [0, 0, 1])
+    np.testing.assert_array_equal(observation[3:7], 0)
+    np.testing.assert_allclose(observation[7:], [0.3, np.tanh(0.6), np.tanh(3.0)], rtol=1e-6)
+
+
+WALKS = TrackerReward(relative=2.0, alive=0.5)
+
+
+def pay_walker(slot, value, speed, fell=False):
+    moved = motion(np.array([speed * CONTROL_DT]), fell=fell)
+    told, action = command(slot, np.array([value])), np.zeros((1, 6), np.float32)
+    return float(tracker_reward(told, moved, CONTROL_DT, action, STANDS, WALKS)[0])
+
+
+@pytest.mark.parametrize(("slot", "value"), [(VELOCITY, 2.0), (VELOCITY, -0.3), (GOAL, 3.0), (GOAL, -1.0)])
+def test_relative_errors_make_it_walk(slot, value):
+    """Half of the way to a wanted speed pays, standing does not; a goal is the speed that leads there."""
+    wanted = value if slot == VELOCITY else np.clip(1.5 * value, *STANDS.speed)
+    still, half, full = (pay_walker(slot, value, share * wanted) for share in (0.0, 0.5, 1.0))
+    assert full > half > still
+    assert full - still > 0.5
+
+
+def test_a_fall_costs_what_being_on_its_feet_pays():
+    assert pay_walker(VELOCITY, 1.0, 1.0) - pay_walker(VELOCITY, 1.0, 1.0, fell=True) == pytest.approx(0.5)

@@ -8,9 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 import pytest
+import scipy.stats
 
 from rebody.inference import InferenceConfig, InferenceModule
-from rebody.inference.decoder import Decoder
+from rebody.inference.decoder import Decoder, Prediction
 from rebody.inference.module import BASE_TASKS, Evidence, loss
 from rebody.inference.prior import SplitPrior, unit_gaussian
 from rebody.types import Belief, GlobalState, Transition
@@ -133,7 +134,7 @@ def test_dynamics_do_not_shape_the_latent_and_rewards_do(decoder):
 
     assert next_state(latent) != next_state(latent + 1)  # it sees the latent
     np.testing.assert_array_equal(jax.jit(jax.grad(next_state))(latent), np.zeros(3))
-    assert np.abs(jax.jit(jax.grad(lambda z: decoder.reward(state, z).mean))(latent)).min() > 0
+    assert np.abs(jax.jit(jax.grad(lambda z: decoder.reward(state, z).expectation))(latent)).min() > 0
 
 
 def test_reward_is_a_weighted_distance_from_a_point_linear_in_the_latent(decoder):
@@ -142,8 +143,8 @@ def test_reward_is_a_weighted_distance_from_a_point_linear_in_the_latent(decoder
     reference = latent @ decoder.reference.weights[0] + decoder.reference.biases[0]
     weights = jnp.log1p(jnp.exp(decoder.weights(latent)))
     expected = -(weights * jnp.abs(state - reference)).sum(axis=-1)
-    np.testing.assert_allclose(decoder.reward(state, latent).mean, expected, rtol=1e-5)
-    np.testing.assert_allclose(decoder.reward(reference, latent).mean, np.zeros(4), atol=1e-6)
+    np.testing.assert_allclose(decoder.reward(state, latent).expectation, expected, rtol=1e-5)
+    np.testing.assert_allclose(decoder.reward(reference, latent).expectation, np.zeros(4), atol=1e-6)
     assert len(decoder.reference.weights) == 1
 
 
@@ -165,17 +166,20 @@ def test_kinds_choose_among_the_fields_and_amounts_say_the_rest(split_decoder):
     weight = jnp.log1p(jnp.exp(split_decoder.weights(amount)))
     expected = -(weight * choice * jnp.abs(state - split_decoder.reference(amount))).sum(axis=-1)
     assert weight.shape == (6, 1)
-    np.testing.assert_allclose(split_decoder.reward(state, latent).mean, expected, rtol=1e-5)
+    np.testing.assert_allclose(split_decoder.reward(state, latent).expectation, expected, rtol=1e-5)
 
 
 def test_kinds_that_choose_alike_are_paid_alike(split_decoder):
     """All that the kinds can do to the reward is to choose: without a choice they do nothing."""
     latent, state = points(3)
     other = np.concatenate([latent[:, :2] + 3.0, latent[:, 2:]], axis=-1)
-    assert np.abs(split_decoder.reward(state, latent).mean - split_decoder.reward(state, other).mean).max() > 1e-2
+    assert (
+        np.abs(split_decoder.reward(state, latent).expectation - split_decoder.reward(state, other).expectation).max()
+        > 1e-2
+    )
     blind = eqx.tree_at(lambda d: d.choice.weights[-1], split_decoder, replace_fn=jnp.zeros_like)
-    np.testing.assert_array_equal(blind.reward(state, latent).mean, blind.reward(state, other).mean)
-    slope = jax.grad(lambda z: blind.reward(state, z).mean.sum())(latent)
+    np.testing.assert_array_equal(blind.reward(state, latent).expectation, blind.reward(state, other).expectation)
+    slope = jax.grad(lambda z: blind.reward(state, z).expectation.sum())(latent)
     assert not np.asarray(slope)[:, :2].any()
     assert np.abs(slope[:, 2:]).max(axis=0).min() > 1e-3
 
@@ -185,7 +189,7 @@ def test_amounts_have_no_part_in_the_choice(split_decoder):
     latent, state = points(3)
 
     def shares(latent):
-        slope = np.abs(jax.grad(lambda s: split_decoder.reward(s, latent).mean.sum())(jnp.asarray(state)))
+        slope = np.abs(jax.grad(lambda s: split_decoder.reward(s, latent).expectation.sum())(jnp.asarray(state)))
         return slope / slope.sum(axis=-1, keepdims=True), slope.sum(axis=-1)
 
     one, size = shares(latent)
@@ -341,3 +345,52 @@ def test_a_split_module_learns_what_kind_it_is_by_its_prior(evidence):
     of_kind = unit_gaussian(Belief(belief.mean[..., :1], belief.variance[..., :1])).mean()
     assert float(found[1][1]["kl"] - found[0][1]["kl"]) == pytest.approx(5 * float(of_kind), rel=1e-4)
     assert float(found[1][0] - found[0][0]) == pytest.approx(0.2 * 5 * float(of_kind), rel=1e-3)
+
+
+@pytest.mark.parametrize("experts", [1, 3])
+def test_likelihood_of_a_prediction(experts):
+    rng = np.random.default_rng(0)
+    mean, value = rng.normal(size=(5, experts)), rng.normal(size=5)
+    share, sigma = rng.dirichlet(np.ones(experts), size=5), rng.uniform(0.3, 2.0, 5)
+    density = np.sum(share * scipy.stats.norm(mean, sigma[:, None]).pdf(value[:, None]), axis=-1)
+    arrays = (a.astype("f4") for a in (mean, np.log(share), 2 * np.log(sigma)))
+    found = Prediction(*arrays).log_likelihood(value.astype("f4"))
+    np.testing.assert_allclose(found, np.log(density) + 0.5 * np.log(2 * np.pi), rtol=1e-4)
+
+
+def test_experts_do_not_blend(split_decoder):
+    """Each is paid for its own field alone, whatever the kinds say."""
+    latent, state = points(3)
+    weight = jnp.log1p(jnp.exp(split_decoder.weights(latent[:, 2:])))
+    expected = -weight * jnp.abs(state - split_decoder.reference(latent[:, 2:]))
+    np.testing.assert_allclose(split_decoder.reward(state, latent).mean, expected, rtol=1e-5)
+
+
+def test_a_sure_belief_is_interpreted_as_its_field_and_the_reference(split_decoder):
+    sure = eqx.tree_at(lambda d: d.choice.weights[0], split_decoder, replace_fn=lambda w: 300 * w)
+    latent, _ = points(3)
+    said = sure.interpret(Belief(latent, np.full_like(latent, 1e-12)))
+    share, place = np.split(np.asarray(said.mean), 2, axis=-1)
+    chosen = np.argmax(sure.choice(latent[:, :2]), axis=-1)
+    np.testing.assert_allclose(share, np.eye(3)[chosen], atol=1e-4)
+    reference = np.asarray(sure.reference(latent[:, 2:]))
+    np.testing.assert_allclose(place, np.eye(3)[chosen] * reference, atol=1e-3)
+    assert np.asarray(said.variance).max() < 1e-6
+
+
+def test_doubt_is_interpreted_as_draws_would_be(split_decoder):
+    """Of the reference exactly, of the share as well as a softmax of a Gaussian can be put in a formula."""
+    rng, (latent, _) = np.random.default_rng(1), points(3)
+    variance = rng.uniform(0.05, 0.5, latent.shape).astype("f4")
+    said = split_decoder.interpret(Belief(latent, variance))
+    draws = latent + np.sqrt(variance) * rng.standard_normal((20_000, *latent.shape)).astype("f4")
+    share = np.asarray(jax.nn.softmax(split_decoder.choice(draws[..., :2]), axis=-1)).mean(axis=0)
+    np.testing.assert_allclose(said.mean[:, :3], share, atol=0.02)
+    top = share.argmax(axis=-1)
+    spread = np.asarray(split_decoder.reference(draws[..., 2:])).var(axis=0)[np.arange(6), top]
+    np.testing.assert_allclose(np.asarray(said.variance)[np.arange(6), 3 + top], spread, rtol=0.05)
+
+
+def test_a_belief_that_is_not_split_says_what_it_says(decoder):
+    belief = Belief(np.ones((2, 3), "f4"), np.ones((2, 3), "f4"))
+    assert decoder.interpret(belief) is belief

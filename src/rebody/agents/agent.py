@@ -9,9 +9,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float, Int
 
+from rebody.agents.slots import SlotChooser
 from rebody.bodies.toys import Toy
 from rebody.control.high_level import HighLevelPolicy, TaskCode
-from rebody.tasks import FAMILIES, GOAL, VELOCITY
+from rebody.tasks import GOAL, VELOCITY, achieved
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task, Transition
 
 
@@ -93,25 +94,28 @@ class Agent(eqx.Module):
 class ReuseAgent(Agent):
     """The toy's frozen policy, imagined from where the robot is (thesis 5.6.2, 6.4)."""
 
+    interpret: Callable[[Belief], Belief]
+    """What the policy sees of a belief."""
     high_level: HighLevelPolicy
     toy: Toy
-    family: int = eqx.field(static=True)
-    """Whose slot a robot's subgoals go to; a point mass has none."""
+    slots: SlotChooser
+    """Which slot a robot's subgoals go to; a point mass has none."""
     horizon: int = eqx.field(static=True)
 
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """The policy's action for a toy; for a robot, where that policy would lead a toy from here."""
-        action = self.high_level(state, belief)
+        action = self.high_level(state, self.interpret(belief))
         ahead = self.imagine(state, belief)
-        value = FAMILIES[self.family].achieved(ahead)
-        return Command(action, Subgoal(jnp.full(state.x.shape, self.family), value))
+        slot = self.slots(belief)
+        return Command(action, Subgoal(slot, achieved(slot, ahead)))
 
     def imagine(self, state: GlobalState, belief: Belief) -> GlobalState:
         """Where the nominal toy would be after `horizon` decisions, the belief held fixed."""
         key = jax.random.key(0)  # a nominal toy has no noise
+        understood = self.interpret(belief)
 
         def step(body, _):
-            action = self.high_level(self.toy.observe(body), belief)
+            action = self.high_level(self.toy.observe(body), understood)
             return self.toy.step(body, action, key), None
 
         body, _ = jax.lax.scan(step, self.toy.from_global(state), None, length=self.horizon)

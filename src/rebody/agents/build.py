@@ -1,12 +1,15 @@
 """From parts to an agent."""
 
+from typing import Literal
+
 import jax.numpy as jnp
 
 from rebody.agents.agent import Agent, FlatAgent, IdleAgent, OracleAgent, ReadoutAgent, ReuseAgent
-from rebody.agents.parts import Inference
-from rebody.control.tracker import SLOTS
+from rebody.agents.parts import Inference, LoadedSlots
+from rebody.agents.slots import OneSlot, SlotChooser, SlotOfCluster
 from rebody.errors import RebodyError
 from rebody.inference.exact import exact_posterior, read_mode
+from rebody.store import tree_hash
 from rebody.types import Task
 
 HORIZON = 15
@@ -22,26 +25,59 @@ AGENTS = {
 """Every kind of agent, and what it is."""
 
 
+SlotsBy = Literal["classifier", "clusters"]
+"""How `reuse` chooses a tracker's slot: by a classifier on the latent, or by the mixture's components."""
+
+
 def check_agent(kind: str) -> None:
     """RebodyError if there is no agent of that kind."""
     if kind not in AGENTS:
         raise RebodyError(f"unknown agent '{kind}'. Agents are: {', '.join(AGENTS)}.")
 
 
-def check_fit(kind: str, inference: Inference, robot: str, moving_fields: tuple[str, ...]) -> None:
-    """RebodyError if this module cannot work on this robot."""
-    inference.contract.check_body(robot, moving_fields, SLOTS)
-    if kind == "reuse" and len(inference.contract.families) > 1:
+def check_fit(
+    kind: str, inference: Inference, robot: str, moving_fields: tuple[str, ...], slots: tuple[str, ...]
+) -> None:
+    """RebodyError if this module cannot work on this robot with a tracker of these slots."""
+    inference.contract.check_body(robot, moving_fields, slots)
+
+
+def slot_chooser(inference: Inference, loaded: LoadedSlots | None, by: SlotsBy) -> SlotChooser:
+    """What chooses the slot of subgoals; a module of one family needs no classifier artifact.
+
+    RebodyError if the artifact is missing, was made for another module, or the module has no mixture to go by.
+    """
+    families = inference.contract.families
+    if loaded is None:
+        if len(families) != 1:
+            raise RebodyError(
+                f"'{inference.name}' tells several families apart: `reuse` needs a classifier to choose the tracker's "
+                "slot (rebody train classifier)."
+            )
+        return OneSlot(families[0])
+    if loaded.inference_hash != tree_hash(inference.parts.module):
         raise RebodyError(
-            f"'{inference.name}' tells several families apart; on a robot `reuse` can drive modules of one family so "
-            "far. On a point mass it can, and `readout` can on both."
+            f"classifier '{loaded.name}' was trained on the beliefs of another module than '{inference.name}'. "
+            "Use that one (its card names it), or train it anew."
         )
+    if by == "classifier":
+        return loaded.parts.classifier
+    if inference.parts.mixture is None:
+        raise RebodyError(f"'{inference.name}' has no mixture, so no clusters to choose slots by.")
+    return SlotOfCluster(inference.parts.mixture, loaded.parts.of_cluster)
 
 
 def build_agent(
-    kind: str, inference: Inference, tasks: Task | None = None, *, stride: int = 1, horizon: int = HORIZON
+    kind: str,
+    inference: Inference,
+    tasks: Task | None = None,
+    *,
+    slots: SlotChooser | None = None,
+    stride: int = 1,
+    horizon: int = HORIZON,
 ) -> Agent:
-    """An agent of a named kind; `oracle` needs the tasks, the active ones [time, episode].
+    """An agent of a named kind; `oracle` needs the tasks, the active ones [time, episode], and `reuse` on a robot
+    what chooses its slots (a point mass has none: the module's first family stands for all).
 
     RebodyError if there is no such kind, or the module cannot serve it.
     """
@@ -51,8 +87,9 @@ def build_agent(
     told = {"told_policy": parts.told_policy, "task_code": inference.task_code}
     match kind:
         case "reuse":
-            imagines = {"high_level": parts.high_level, "toy": inference.toy, "horizon": horizon}
-            return ReuseAgent(**listens, **imagines, family=contract.families[0])
+            acts = {"interpret": parts.module.decoder.interpret, "high_level": parts.high_level}
+            slots = slots or OneSlot(contract.families[0])
+            return ReuseAgent(**listens, **acts, toy=inference.toy, horizon=horizon, slots=slots)
         case "readout":
             return ReadoutAgent(**listens, **told)
         case "bayes":

@@ -3,23 +3,22 @@
 from abc import abstractmethod
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Float
 
 from rebody.control.flat import FlatPolicy
-from rebody.control.tracker import Command, Tracker
-from rebody.tasks import GOAL
+from rebody.control.tracker import Tracker, relative
 from rebody.types import AnyArray, Belief, Subgoal
 
 
 class Controller(eqx.Module):
-    """(joint state, x, subgoal, belief) -> joint action; each kind looks at what it needs."""
+    """(joint state, x, pitch, subgoal, belief) -> joint action; each kind looks at what it needs."""
 
     @abstractmethod
     def __call__(
         self,
         joints: Float[AnyArray, "*batch joint"],
         x: Float[AnyArray, "*batch"],
+        pitch: Float[AnyArray, "*batch"],
         subgoal: Subgoal,
         belief: Belief | None,
     ) -> Float[AnyArray, "*batch action"]:
@@ -31,9 +30,9 @@ class TrackerController(Controller):
 
     tracker: Tracker
 
-    def __call__(self, joints, x, subgoal, belief):
+    def __call__(self, joints, x, pitch, subgoal, belief):
         """A goal is made relative to where the robot is now."""
-        return self.tracker(joints, Command(subgoal.slot, relative(subgoal, x)))
+        return self.tracker(joints, relative(subgoal, x, pitch))
 
 
 class FlatController(Controller):
@@ -41,12 +40,7 @@ class FlatController(Controller):
 
     policy: FlatPolicy
 
-    def __call__(self, joints, x, subgoal, belief):
+    def __call__(self, joints, x, pitch, subgoal, belief):
         """There is no subgoal."""
         assert belief is not None
         return self.policy(joints, x, belief)
-
-
-def relative(subgoal: Subgoal, x: Float[AnyArray, "*batch"]) -> Float[AnyArray, "*batch"]:
-    """A subgoal as the robot sees it now: a goal is a point in the world, so its distance shrinks."""
-    return subgoal.value - jnp.where(subgoal.slot == GOAL, x, 0.0)

@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float
 
 from rebody.agents.agent import Observation
-from rebody.agents.build import HORIZON, build_agent, check_fit
+from rebody.agents.build import HORIZON, build_agent, check_fit, slot_chooser
 from rebody.agents.controller import TrackerController
-from rebody.agents.parts import Inference, LoadedTracker, load_inference, load_tracker
+from rebody.agents.parts import Inference, LoadedSlots, LoadedTracker, load_inference, load_slots_of, load_tracker
 from rebody.agents.rollout import begin, decide, joint_action
 from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
@@ -19,12 +19,21 @@ from rebody.types import Belief, Subgoal
 class LiveAgent:
     """`reuse` on one robot, step by step; see `load_agent`."""
 
-    def __init__(self, spec: RobotSpec, inference: Inference, tracker: LoadedTracker, horizon: int = HORIZON):
+    def __init__(
+        self,
+        spec: RobotSpec,
+        inference: Inference,
+        tracker: LoadedTracker,
+        slots: LoadedSlots | None = None,
+        horizon: int = HORIZON,
+    ):
         """RebodyError if the module does not fit the robot."""
-        check_fit("reuse", inference, spec.name, spec.moving_fields)
+        check_fit("reuse", inference, spec.name, spec.moving_fields, tracker.tracker.slots)
         self._spec, self._inference = spec, inference
         self._controller = TrackerController(tracker.tracker)
-        self._agent = build_agent("reuse", inference, horizon=horizon)
+        self._agent = build_agent(
+            "reuse", inference, slots=slot_chooser(inference, slots, "classifier"), horizon=horizon
+        )
         self.reset()
 
     def reset(self) -> None:
@@ -48,8 +57,8 @@ class LiveAgent:
             self._decide(qpos, reward)
         self._steps += 1
         x = np.asarray(qpos[self._spec.root_addresses[0]], np.float32)
-        joints = self._spec.joint_state(qpos, qvel)
-        return np.asarray(joint_action(self._controller, joints, x, self._command.subgoal, self._carry.belief))
+        pitch, joints = np.asarray(self._spec.pitch(qpos), np.float32), self._spec.joint_state(qpos, qvel)
+        return np.asarray(joint_action(self._controller, joints, x, pitch, self._command.subgoal, self._carry.belief))
 
     @property
     def belief(self) -> Belief:
@@ -78,7 +87,17 @@ class LiveAgent:
 
 
 def load_agent(
-    robot: str = "cheetah", inference: str = "position", tracker: str | None = None, horizon: int = HORIZON
+    robot: str = "cheetah",
+    inference: str = "goal-velocity",
+    tracker: str | None = None,
+    classifier: str | None = None,
+    horizon: int = HORIZON,
 ) -> LiveAgent:
-    """An agent of shipped or own artifacts, ready to `step`; RebodyError if they do not fit together."""
-    return LiveAgent(load_robot(robot), load_inference(inference), load_tracker(tracker or f"tracker-{robot}"), horizon)
+    """An agent of shipped or own artifacts, ready to `step`; RebodyError if they do not fit together.
+
+    `robot` is a name or the path of a TOML file; tracker and classifier default to `tracker-ROBOT` and
+    `classifier-INFERENCE`, which a module of one family does not need.
+    """
+    spec, module = load_robot(robot), load_inference(inference)
+    slots = load_slots_of(module, classifier)
+    return LiveAgent(spec, module, load_tracker(tracker or f"tracker-{spec.name}"), slots, horizon)

@@ -9,7 +9,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Int
 
+from rebody.agents.slots import SlotClassifier
+from rebody.bodies.robot import Reach
 from rebody.bodies.toys import Toy, make_toy
 from rebody.control.flat import FlatPolicy
 from rebody.control.high_level import HighLevelPolicy, TaskCode
@@ -20,9 +23,10 @@ from rebody.inference import InferenceConfig, InferenceModule
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import MixturePrior, no_mixture
 from rebody.inference.probe import Probe
+from rebody.nn import MLP
 from rebody.store import Artifact, arrays_into_tree, load_artifact
 from rebody.tasks import family_index
-from rebody.types import Tree
+from rebody.types import AnyArray, Tree
 
 
 class InferenceParts(eqx.Module):
@@ -70,6 +74,23 @@ class LoadedFlat:
     policy: FlatPolicy
 
 
+class SlotParts(eqx.Module):
+    """What a classifier artifact holds: two ways to choose a slot."""
+
+    classifier: SlotClassifier
+    of_cluster: Int[AnyArray, " K"]  # the slot of each of the mixture's components; empty without a mixture
+
+
+@dataclass(frozen=True)
+class LoadedSlots:
+    """A loaded classifier artifact; it understands the beliefs of one module only."""
+
+    name: str
+    inference_hash: str
+    """Of the module's weights."""
+    parts: SlotParts
+
+
 def inference_template(config: dict[str, Any]) -> InferenceParts:
     """Parts of the right shapes, to be filled with weights."""
     inference, policy, mixture = config["inference"], config["high_level"], config.get("mixture")
@@ -79,22 +100,29 @@ def inference_template(config: dict[str, Any]) -> InferenceParts:
     weights = np.zeros((settings.latent + 1, len(ranges)), np.float32)
     return InferenceParts(
         module=InferenceModule(settings, actions, jax.random.key(0)),
-        high_level=_policy_template(settings.latent, actions, policy),
+        high_level=_policy_template(settings.interpreted, actions, policy),
         told_policy=_policy_template(2 * len(ranges), actions, policy),
         probe=Probe(np.zeros(len(ranges), np.int32), weights, weights),
-        mixture=no_mixture(mixture["maximum"], settings.kinds or settings.latent) if mixture else None,
+        mixture=no_mixture(mixture["maximum"], settings.clustered) if mixture else None,
     )
 
 
 def tracker_template(config: dict[str, Any]) -> Tracker:
     """A tracker of the right shapes, to be filled with weights."""
     actor = _actor_template(config["observations"], config["actions"], config)
-    return Tracker(actor, config["max_distance"], config["max_speed"])
+    return Tracker(actor, Reach(**{name: _as_tuple(value) for name, value in config["reach"].items()}))
 
 
 def flat_template(config: dict[str, Any]) -> FlatPolicy:
     """A flat policy of the right shapes, to be filled with weights."""
     return FlatPolicy(_actor_template(config["observations"], config["actions"], config), config["reach"])
+
+
+def slots_template(config: dict[str, Any]) -> SlotParts:
+    """A classifier of the right shapes, to be filled with weights."""
+    families = tuple(config["families"])
+    net = MLP(config["latent"], len(families), tuple(config["hidden"]), key=jax.random.key(0))
+    return SlotParts(SlotClassifier(net, families), np.zeros(config["components"], np.int32))
 
 
 def load_inference(reference: str) -> Inference:
@@ -119,6 +147,20 @@ def load_flat(reference: str) -> LoadedFlat:
     with _understood(artifact):
         config = artifact.config
         return LoadedFlat(artifact.name, config["robot"], config["inference_hash"], _fill(flat_template, artifact))
+
+
+def load_slots(reference: str) -> LoadedSlots:
+    """A shipped classifier by name, or one in a folder; RebodyError if it cannot be read."""
+    artifact = load_artifact(reference, "classifier")
+    with _understood(artifact):
+        return LoadedSlots(artifact.name, artifact.config["inference_hash"], _fill(slots_template, artifact))
+
+
+def load_slots_of(inference: Inference, reference: str | None) -> LoadedSlots | None:
+    """The named classifier, else the shipped one of a module that needs one; RebodyError if it cannot be had."""
+    if reference is None and len(inference.contract.families) == 1:
+        return None
+    return load_slots(reference or f"classifier-{inference.name}")
 
 
 def task_code(target_ranges: Mapping[str, tuple[float, float]]) -> TaskCode:

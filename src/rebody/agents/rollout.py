@@ -100,7 +100,8 @@ def rollout_on_robot(
 def follow(controller: Controller, batch: RobotBatch, subgoal: Subgoal, belief: Belief | None = None) -> None:
     """One control step of every robot."""
     joints = batch.spec.joint_state(batch.qpos, batch.qvel)
-    batch.step(np.asarray(joint_action(controller, joints, batch.x.astype(np.float32), subgoal, belief)))
+    x, pitch = (where.astype(np.float32) for where in (batch.x, batch.spec.pitch(batch.qpos)))
+    batch.step(np.asarray(joint_action(controller, joints, x, pitch, subgoal, belief)))
 
 
 @eqx.filter_jit
@@ -108,11 +109,12 @@ def joint_action(
     controller: Controller,
     joints: Float[AnyArray, "*episode joint"],
     x: Float[AnyArray, "*episode"],
+    pitch: Float[AnyArray, "*episode"],
     subgoal: Subgoal,
     belief: Belief | None,
 ) -> Float[AnyArray, "*episode action"]:
-    """What the controller does with the joints of robots at x [m]."""
-    return controller(joints, x, subgoal, belief)
+    """What the controller does with the joints of robots at x [m] and pitch [rad]."""
+    return controller(joints, x, pitch, subgoal, belief)
 
 
 @eqx.filter_jit

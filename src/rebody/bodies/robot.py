@@ -3,8 +3,8 @@
 The only file that knows `mujoco.batch`.
 """
 
+import math
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -31,6 +31,34 @@ _DIVERGED = [
 ]
 
 
+PLANE_JOINTS = ("rebody-x", "rebody-z", "rebody-pitch")
+"""Joints of a root body that is held to the plane."""
+
+
+@dataclass(frozen=True)
+class Fall:
+    """When a robot counts as fallen: too low or too much aslant, for long enough."""
+
+    min_height: float = -math.inf
+    """Of the torso above the floor [m]."""
+    max_pitch: float = math.inf
+    """Either way [rad]."""
+    lasts_s: float = 0.0
+    """Seconds without a break."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What may be asked of a robot's tracker."""
+
+    speed: tuple[float, float]
+    """Fastest backward (negative) and forward [m/s]."""
+    distance: float = 5.0
+    """Farthest goal [m]; farther ones are cut to it."""
+    pitch: tuple[float, float] | None = None
+    """Pitches that it can stand at [rad]; None for a robot that is not asked to."""
+
+
 @dataclass(frozen=True)
 class RobotSpec:
     """A planar robot: its model, its control rate and its observation mapping (thesis 5.7)."""
@@ -39,25 +67,34 @@ class RobotSpec:
     mjcf: Path
     frame_skip: int
     """Simulation steps of one control step."""
-    root_joints: tuple[str, str, str]
-    """Names of the joints that carry x [m], z [m] and pitch [rad] of the root body."""
+    root: tuple[str, str, str] | str
+    """Names of the joints that carry x [m], z [m] and pitch [rad] of the root body, or the name of a root body that
+    floats freely: it is held to the plane of x and z then."""
     reset_noise: float
     """Half-width of the uniform noise on positions and std of that on velocities at a reset."""
-    has_fallen: Callable[[Floats, Floats], Bool[np.ndarray, "..."]]
-    """(torso height above the floor [m], pitch [rad]) -> lies on the ground, at this moment."""
-    fall_duration: float
-    """Seconds that it must lie before it counts as a fall."""
+    fall: Fall
+    """When it counts as fallen."""
+    reach: Reach
+    """What its tracker is trained for."""
     moving_fields: tuple[str, ...] = ("x", "z", "pitch", "vx", "vz", "pitch_rate")
     """Fields of the global state that this body can move."""
 
     @cached_property
     def model(self) -> mujoco.MjModel:
         """The compiled model."""
-        spec = mujoco.MjSpec.from_file(str(self.mjcf))
+        try:
+            spec = mujoco.MjSpec.from_file(str(self.mjcf))
+        except ValueError as error:
+            raise RebodyError(f"robot '{self.name}': MuJoCo cannot read '{self.mjcf}': {error}") from error
+        if isinstance(self.root, str):
+            _hold_to_plane(spec, self.root, self.name)
         with warnings.catch_warnings():
             # what MuJoCo advises instead of the cheetah's `settotalmass` changes the last bits of its physics
             warnings.filterwarnings("ignore", message="compiler attribute 'settotalmass'")
-            return spec.compile()
+            try:
+                return spec.compile()
+            except ValueError as error:
+                raise RebodyError(f"robot '{self.name}': MuJoCo cannot use '{self.mjcf}': {error}") from error
 
     @cached_property
     def control_dt(self) -> float:
@@ -76,11 +113,21 @@ class RobotSpec:
             )
         return steps
 
+    @property
+    def root_joints(self) -> tuple[str, str, str]:
+        """Names of the joints that carry x, z and pitch."""
+        return PLANE_JOINTS if isinstance(self.root, str) else self.root
+
     @cached_property
     def root_addresses(self) -> tuple[int, int, int]:
         """Where x, z and pitch stand in qpos."""
         x, z, pitch = (int(self.model.joint(name).qposadr[0]) for name in self.root_joints)
         return x, z, pitch
+
+    @cached_property
+    def x_velocity_address(self) -> int:
+        """Where the velocity of x stands in qvel."""
+        return int(self.model.joint(self.root_joints[0]).dofadr[0])
 
     @cached_property
     def torso_height(self) -> float:
@@ -120,12 +167,29 @@ class RobotSpec:
     def lies(self, qpos: Floats) -> Bool[np.ndarray, "..."]:
         """Whether each robot lies on the ground at this moment."""
         z = qpos[..., self.root_addresses[1]] - self._rest_z
-        return self.has_fallen(self.torso_height + z, self.pitch(qpos))
+        is_low = self.torso_height + z < self.fall.min_height
+        return is_low | (np.abs(self.pitch(qpos)) > self.fall.max_pitch)
 
     @cached_property
     def _rest_z(self) -> float:
         # not zero where the slide joint has a `ref` (hopper, walker: 1.25)
         return float(self.model.qpos0[self.root_addresses[1]])
+
+
+def _hold_to_plane(spec: mujoco.MjSpec, body_name: str, robot: str) -> None:
+    """Replace a body's free joint by slides along x and z and a hinge about y."""
+    body = spec.body(body_name)
+    free = [joint for joint in body.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE] if body else []
+    if not free:
+        raise RebodyError(f"robot '{robot}': its model has no body '{body_name}' that floats freely (a free joint).")
+    spec.delete(free[0])
+    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+    axes = ((slide, [1, 0, 0]), (slide, [0, 0, 1]), (hinge, [0, 1, 0]))
+    for name, (kind, axis) in zip(PLANE_JOINTS, axes, strict=True):
+        joint = body.add_joint(name=name, type=kind, axis=axis, limited=False, armature=0)
+        joint.damping[:] = 0  # whatever the model's defaults say
+    for key in list(spec.keys):  # they have a number more than the joints now
+        spec.delete(key)
 
 
 def wrap_angle(angle: Floats) -> Floats:
@@ -155,7 +219,7 @@ class RobotBatch:
     @property
     def fallen(self) -> Bool[np.ndarray, " robot"]:
         """Which robots have lain long enough to count as fallen."""
-        return self.lying_s >= self.spec.fall_duration
+        return (self.lying_s > 0) & (self.lying_s >= self.spec.fall.lasts_s)
 
     def reset(self, rng: np.random.Generator, robots: Bool[np.ndarray, " robot"] | None = None) -> None:
         """Put the chosen robots (default: all) at x = 0 in the rest pose, with Gymnasium's reset noise."""
@@ -182,6 +246,10 @@ class RobotBatch:
                 "or lower the model's time step."
             )
         self.lying_s[:] = np.where(self.spec.lies(self.qpos), self.lying_s + self.spec.control_dt, 0.0)
+
+    def push(self, change: Float[np.ndarray, " robot"]) -> None:
+        """Change the speed of each robot's every part along x [m/s]."""
+        self.qvel[:, self.spec.x_velocity_address] += change
 
     @property
     def state(self) -> Float[np.ndarray, "robot state"]:

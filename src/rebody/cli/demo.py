@@ -7,64 +7,104 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from rebody.bodies import shipped_robots
 from rebody.cli.run import describe, shoot
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, save_results, summary_table
+from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.results import EpisodeResult
 from rebody.report import plot_episode, plot_transfer
-from rebody.tasks.task_file import TaskSpec
+from rebody.store import shipped_artifacts
+from rebody.tasks.task_file import Switch, TaskSpec
 
-HIDDEN_GOALS = np.linspace(-9.5, 9.5, 20)
-SHOWN = TaskSpec("goal", 7.0)
+HIDDEN_GOALS = np.linspace(2.0, 12.0, 5)
+SPEEDS, SLOWEST = 5, 1.0
+"""Speeds either way, from the slowest that the module learned on [m/s] to the fastest that the tracker did."""
+SHOWN_S = 16.0
+"""Length of the filmed episode [s]; its task changes half-way."""
 
 
 @dataclass(frozen=True)
 class Demo:
-    """Transfer to the cheetah, zero-shot: table, figures and a video on the shipped artifacts."""
+    """Transfer to every robot that has a tracker, zero-shot: tables, figures and videos on the shipped artifacts."""
 
     out: Path = Path("demo")
-    """Folder for figures, video and JSON."""
+    """Folder for figures, videos and JSON."""
 
     def run(self) -> None:
-        """Evaluate three agents, print, draw, film."""
+        """Evaluate three agents on each robot, print, draw, film."""
         console = Console()
         console.print(
-            "A module that learned on a point mass what a reward tells about a hidden goal\n"
-            "now drives a robot that it has never seen. Nobody tells it the goal.\n",
+            "A module that learned on a point mass what a reward tells about a hidden task (go there, or run so fast)\n"
+            "now drives robots that it has never seen. Nobody tells it the task.\n",
             highlight=False,
         )
-        trial = TrialOptions(robot="cheetah", inference="position").load()
-        specs = [TaskSpec("goal", round(float(goal), 2)) for goal in HIDDEN_GOALS]
-        with console.status("60 episodes of 20 s on the cheetah"):
+        for robot in robots_with_tracker():
+            self._show(TrialOptions(robot=robot).load(), console)
+
+    def _show(self, trial: Trial, console: Console) -> None:
+        specs = hidden_tasks(trial)
+        with console.status(f"{3 * len(specs)} episodes of 20 s on the {trial.robot_name}"):
             reuse, oracle, idle = (
                 evaluate(replace(trial, agent=agent), specs, 1) for agent in ("reuse", "oracle", "idle")
             )
         console.print(_table(reuse, oracle, idle))
         console.print(summary_table([reuse, oracle, idle]))
-        save_results(reuse, self.out / "reuse.json")
-        plot_transfer(reuse, oracle, idle, self.out / "transfer.png")
-        written = ["reuse.json", "transfer.png", "episode.png"]
-        shorter = replace(trial, seconds=10.0)
+        json, picture, video, figure = (
+            self.out / f"{trial.robot_name}{ending}" for ending in (".json", ".png", ".mp4", "-episode.png")
+        )
+        save_results(reuse, json)
+        plot_transfer(reuse, oracle, idle, picture)
+        written = [json, picture, figure]
+        shown, spec = replace(trial, seconds=SHOWN_S), shown_task(trial)
         try:
-            episode = shoot(shorter, SHOWN, self.out / "cheetah.mp4")
-            written.append("cheetah.mp4")
+            episode = shoot(shown, spec, video)
+            written.append(video)
         except RebodyError as error:
             console.print(f"no video: {error}", markup=False)
-            episode = evaluate(shorter, [SHOWN], 1).episodes[0]
-        plot_episode(episode, self.out / "episode.png")
+            episode = evaluate(shown, [spec], 1).episodes[0]
+        plot_episode(episode, figure)
         console.print(f"\nfilmed: {describe(episode)}", highlight=False)
-        console.print("written: " + ", ".join(str(self.out / name) for name in written), highlight=False)
+        console.print("written: " + ", ".join(map(str, written)) + "\n", highlight=False)
+
+
+def robots_with_tracker() -> list[str]:
+    """Robots whose tracker ships."""
+    artifacts = dict(shipped_artifacts())
+    return [robot for robot in shipped_robots() if f"tracker-{robot}" in artifacts]
+
+
+def hidden_tasks(trial: Trial) -> list[TaskSpec]:
+    """Goals and speeds, front and back, that the robot can reach in 20 s."""
+    assert trial.robot is not None
+    slowest, fastest = trial.robot.reach.speed
+    goals = [round(float(sign * goal), 2) for sign in (-1, 1) for goal in HIDDEN_GOALS]
+    both_ways = np.concatenate([np.linspace(-SLOWEST, slowest, SPEEDS), np.linspace(SLOWEST, fastest, SPEEDS)])
+    speeds = [round(float(speed), 2) for speed in both_ways]
+    return [TaskSpec("goal", goal) for goal in goals] + [TaskSpec("velocity", speed) for speed in speeds]
+
+
+def shown_task(trial: Trial) -> TaskSpec:
+    """Run forward, and half-way go back to where it began."""
+    assert trial.robot is not None
+    speed = round(0.6 * trial.robot.reach.speed[1], 2)
+    return TaskSpec("velocity", speed, Switch(at_s=SHOWN_S / 2, family="goal", target=2.0))
 
 
 def _table(reuse: Results, oracle: Results, idle: Results) -> Table:
-    """Each hidden goal with three final errors."""
-    table = Table(title="final error [m] on the cheetah, 20 s", caption="idle: what a robot without inference gets")
-    for column in ("hidden goal", "read from the belief", "reuse", "oracle", "idle"):
+    """Each hidden task with three final errors."""
+    table = Table(title=f"final error on the {reuse.robot}, 20 s", caption="idle: what a robot without inference gets")
+    for column in ("hidden task", "read from the belief", "reuse", "oracle", "idle"):
         table.add_column(column, justify="right")
     for found, told, still in zip(reuse.episodes, oracle.episodes, idle.episodes, strict=True):
         table.add_row(
-            f"{found.target:+.1f} m",
-            f"{found.inferred_target[-1]:+.2f} m",
-            *(f"{episode.final_error:.3f}" for episode in (found, told, still)),
+            f"{found.family} {found.target:+.2f}",
+            f"{found.inferred_family[-1]} {found.inferred_target[-1]:+.2f}",
+            *(_error(episode) for episode in (found, told, still)),
         )
     return table
+
+
+def _error(episode: EpisodeResult) -> str:
+    return f"{episode.final_error:.3f}" + (" (fell)" if episode.fell else "")

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rebody.agents.build import AGENTS
-from rebody.bodies import ROBOTS
+from rebody.bodies import shipped_robots
 from rebody.evaluation.evaluate import POINT_MASS
 from rebody.report.thesis import FIGURES
 from rebody.store import load_artifact, shipped_artifacts
@@ -21,7 +21,7 @@ class List:
     def run(self) -> None:
         """Print them."""
         table = Table(show_header=False, box=None, padding=(0, 2))
-        for name in (POINT_MASS, *ROBOTS):
+        for name in (POINT_MASS, *shipped_robots()):
             table.add_row("body", name, "the toy" if name == POINT_MASS else "MuJoCo robot")
         for family in FAMILIES:
             table.add_row("family", family.name, f"{family.unit}, solved within {family.tolerance:g}")

@@ -41,10 +41,13 @@ def run(arguments: list[str]) -> int:
 def parse(arguments: list[str]) -> Any:
     """The command with its options; prints help or usage and exits where tyro does."""
     from rebody.cli.demo import Demo
+    from rebody.cli.diagnose import Diagnose
     from rebody.cli.evaluate import Evaluate
     from rebody.cli.figure import Figures
     from rebody.cli.listing import List
+    from rebody.cli.robot import Robot
     from rebody.cli.run import RunTask
+    from rebody.cli.stress import Stress
     from rebody.cli.train import train_command
 
     train: Any = Annotated[train_command(arguments), tyro.conf.subcommand("train")]
@@ -52,8 +55,11 @@ def parse(arguments: list[str]) -> Any:
         Annotated[Demo, tyro.conf.subcommand("demo")]
         | Annotated[RunTask, tyro.conf.subcommand("run")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+        | Annotated[Diagnose, tyro.conf.subcommand("diagnose")]
         | train
         | Annotated[Figures, tyro.conf.subcommand("figure")]
+        | Annotated[Robot, tyro.conf.subcommand("robot")]
+        | Annotated[Stress, tyro.conf.subcommand("stress")]
         | Annotated[List, tyro.conf.subcommand("list")]
     )
     return tyro.cli(commands, prog="rebody", args=arguments, description=DESCRIPTION)

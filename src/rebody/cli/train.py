@@ -7,10 +7,12 @@ from typing import Annotated, Any
 import tyro
 from rich.console import Console
 
+from rebody.bodies import load_robot
 from rebody.errors import RebodyError
+from rebody.training.classifier import ClassifierConfig, train_classifier
 from rebody.training.flat import FlatConfig, train_flat
 from rebody.training.inference import PRESETS, MetaConfig, train_inference
-from rebody.training.tracker import TrackerConfig, train_tracker
+from rebody.training.tracker import TrackerConfig, tracker_preset, train_tracker
 
 
 @dataclass(frozen=True)
@@ -42,17 +44,17 @@ class TrainInference:
 class TrainTracker:
     """Train the tracker of a robot: (joint state, subgoal) -> joint action."""
 
-    robot: str
-    """Name of the robot (see `rebody list`)."""
-    out: Path
+    config: Annotated[TrackerConfig, tyro.conf.arg(name="")]
+    out: Path = tyro.MISSING
     """Folder of the run, and of the artifact that it becomes."""
+    robot: str = "cheetah"
+    """A robot's name (see `rebody list`), or the path of its TOML file."""
     seed: int = 0
     """Seed of everything that is random."""
     resume: bool = False
     """Go on with the run in --out."""
     init_from: str | None = None
     """Start from the network of this tracker artifact."""
-    config: Annotated[TrackerConfig, tyro.conf.arg(name="")] = field(default_factory=TrackerConfig)
 
     def run(self) -> None:
         """Train, save, say where."""
@@ -88,20 +90,43 @@ class TrainFlat:
         _show_card(folder)
 
 
-def train_command(arguments: list[str]) -> type:
-    """The type of `rebody train`, its defaults those of the preset that the command line names.
+@dataclass(frozen=True)
+class TrainClassifier:
+    """Train what chooses a tracker's slot from a belief; everything happens on the toy (thesis 6.4)."""
 
-    RebodyError if there is no preset of that name.
+    out: Path
+    """Folder of the run, and of the artifact that it becomes."""
+    inference: str = "goal-velocity"
+    """Inference artifact: a shipped name or a folder."""
+    seed: int = 0
+    """Seed of everything that is random."""
+    resume: bool = False
+    """Go on with the run in --out."""
+    config: Annotated[ClassifierConfig, tyro.conf.arg(name="")] = field(default_factory=ClassifierConfig)
+
+    def run(self) -> None:
+        """Train, save, say where."""
+        _show_card(train_classifier(self.inference, self.config, self.out, self.seed, resume=self.resume))
+
+
+def train_command(arguments: list[str]) -> type:
+    """The type of `rebody train`, its defaults those of the preset and the robot that the command line names.
+
+    RebodyError if there is no such preset or robot.
     """
-    preset = _wanted_preset(arguments)
+    preset = _wanted("--preset", arguments) or TrainInference.preset
     if preset not in PRESETS:
         raise RebodyError(f"unknown preset '{preset}'. Presets are: {', '.join(PRESETS)}.")
     default = TrainInference(config=PRESETS[preset](), preset=preset)
     # made here, since the defaults are known only now
     inference: Any = Annotated[TrainInference, tyro.conf.subcommand("inference", default=default, prefix_name=False)]
-    tracker: Any = Annotated[TrainTracker, tyro.conf.subcommand("tracker", prefix_name=False)]
+    robot = _wanted("--robot", arguments) if "tracker" in arguments else None
+    spec = load_robot(robot or TrainTracker.robot)
+    on_robot = TrainTracker(config=tracker_preset(spec), robot=robot or TrainTracker.robot)
+    tracker: Any = Annotated[TrainTracker, tyro.conf.subcommand("tracker", default=on_robot, prefix_name=False)]
+    classifier: Any = Annotated[TrainClassifier, tyro.conf.subcommand("classifier", prefix_name=False)]
     flat: Any = Annotated[TrainFlat, tyro.conf.subcommand("flat", prefix_name=False)]
-    command: Any = Annotated[inference | tracker | flat, tyro.conf.arg(name="")]
+    command: Any = Annotated[inference | tracker | classifier | flat, tyro.conf.arg(name="")]
     doc = "Train a part; every shipped artifact is made by these commands."
     return make_dataclass("Train", [("command", command)], frozen=True, namespace={"run": _run, "__doc__": doc})
 
@@ -110,13 +135,14 @@ def _run(train: Any) -> None:
     train.command.run()
 
 
-def _wanted_preset(arguments: list[str]) -> str:
+def _wanted(option: str, arguments: list[str]) -> str | None:
+    """What the command line says of an option that others' defaults hang on."""
     for i, argument in enumerate(arguments):
-        if argument == "--preset" and i + 1 < len(arguments):
+        if argument == option and i + 1 < len(arguments):
             return arguments[i + 1]
-        if argument.startswith("--preset="):
-            return argument.removeprefix("--preset=")
-    return TrainInference.preset
+        if argument.startswith(f"{option}="):
+            return argument.removeprefix(f"{option}=")
+    return None
 
 
 def _show_card(folder: Path) -> None:

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import tyro
 
-from rebody.agents.build import AGENTS, HORIZON, check_agent
-from rebody.agents.parts import load_flat, load_inference, load_tracker
+from rebody.agents.build import AGENTS, HORIZON, SlotsBy, check_agent
+from rebody.agents.parts import load_flat, load_inference, load_slots_of, load_tracker
 from rebody.bodies import load_robot
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import POINT_MASS, Trial
@@ -21,13 +21,17 @@ class TrialOptions:
 
     robot: str = "cheetah"
     """Body (see `rebody list`)."""
-    inference: str = "position"
+    inference: str = "goal-velocity"
     """Inference artifact: a shipped name or a folder."""
     agent: Annotated[str, tyro.conf.arg(help=AGENT_HELP)] = "reuse"
     tracker: str | None = None
     """Tracker artifact; default tracker-ROBOT."""
     flat: str | None = None
     """Policy of agent `flat`; default flat-ROBOT."""
+    classifier: str | None = None
+    """What chooses the slots of `reuse`; default classifier-INFERENCE where a module knows several families."""
+    slots_by: SlotsBy = "classifier"
+    """Choose them by the classifier, or by the mixture's clusters."""
     seconds: float = 20.0
     """Length of an episode."""
     stride: int = 1
@@ -44,13 +48,17 @@ class TrialOptions:
             raise RebodyError(f"--{'stride' if self.stride < 1 else 'horizon'} must be at least 1.")
         if not math.isfinite(self.seconds):
             raise RebodyError(f"--seconds must be finite, not {self.seconds:g}.")
-        on_robot, is_flat = self.robot != POINT_MASS, self.agent == "flat"
+        robot = None if self.robot == POINT_MASS else load_robot(self.robot)
+        inference = load_inference(self.inference)
+        bridged = robot is not None and self.agent == "reuse"
         return Trial(
             agent=self.agent,
-            robot=load_robot(self.robot) if on_robot else None,
-            inference=load_inference(self.inference),
-            tracker=load_tracker(self.tracker or f"tracker-{self.robot}") if on_robot else None,
-            flat=load_flat(self.flat or f"flat-{self.robot}") if on_robot and is_flat else None,
+            robot=robot,
+            inference=inference,
+            tracker=load_tracker(self.tracker or f"tracker-{robot.name}") if robot else None,
+            flat=load_flat(self.flat or f"flat-{robot.name}") if robot and self.agent == "flat" else None,
+            slots=load_slots_of(inference, self.classifier) if bridged else None,
+            slots_by=self.slots_by,
             seconds=self.seconds,
             stride=self.stride,
             horizon=self.horizon or (1 if self.thesis else HORIZON),

@@ -1,28 +1,38 @@
 """The tracker ("transfer function" in the thesis, 5.5): (joint state, subgoal) -> joint action.
 
-A command is the subgoal as the robot sees it: a goal relative to where the robot is now, cut to the
-trained distance, or a speed. One network serves all slots (5.6).
+A command is the subgoal as the robot sees it: a goal or a pitch relative to where the robot is now, cut to what it
+was trained for, or a speed. One network serves all slots (5.6).
 """
 
 from dataclasses import dataclass
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
+from rebody.bodies.robot import Reach
 from rebody.control.sac import Actor
-from rebody.tasks.families import GOAL
-from rebody.types import AnyArray
+from rebody.tasks.families import GOAL, STAND
+from rebody.types import AnyArray, Subgoal
 
-SLOTS = ("goal", "velocity")
-"""Families that a command can address, by index."""
+MARGIN = 1.1
+"""Trackers are trained on commands that go beyond a robot's reach by this factor, and cut farther ones to it."""
 
 
 class Command(eqx.Module):
     """A subgoal relative to the robot."""
 
-    slot: Int[AnyArray, "*batch"]
-    value: Float[AnyArray, "*batch"]  # goal: m ahead of the robot; velocity: m/s
+    slot: Int[AnyArray, "*batch"]  # index into `rebody.tasks.FAMILIES`
+    value: Float[AnyArray, "*batch"]  # goal: m ahead of the robot; velocity: m/s; stand: rad to turn
+
+
+class Motion(eqx.Module):
+    """What a control step did to the robot."""
+
+    displacement: Float[AnyArray, "*batch"]  # m
+    turn: Float[AnyArray, "*batch"]  # rad
+    pitch: Float[AnyArray, "*batch"]  # rad, afterwards
+    fell: Bool[AnyArray, "*batch"]
 
 
 @dataclass(frozen=True)
@@ -32,11 +42,18 @@ class TrackerReward:
     distance: float = 0.2
     """Per metre from the goal."""
     arrival: float = 0.5
-    """Paid in full on the goal, half at 0.1 m: pulls the last centimetres."""
+    """Paid in full on a goal or pitch, half at 0.1 m or rad: pulls the last centimetres."""
     speed: float = 0.4
     """Per m/s from the wanted speed."""
+    turn: float = 0.5
+    """Per rad from the wanted pitch."""
+    relative: float = 0.0
+    """Paid in full at the wanted speed, less by the error relative to it; a far goal is the speed that leads there.
+    In place of `distance` and `speed` where a robot must learn to walk first."""
+    alive: float = 0.0
+    """Paid as long as it has not fallen."""
     upright: float = 0.5
-    """Times 1 - cos(pitch): a robot must not end on its back."""
+    """Times 1 - cos(pitch), where no pitch is asked for: a robot must not end on its back."""
     energy: float = 0.02
     """Times the mean squared action: a robot that has arrived stands still."""
 
@@ -45,39 +62,77 @@ class Tracker(eqx.Module):
     """A policy for one robot, with its fixed input scaling."""
 
     actor: Actor
-    max_distance: float = eqx.field(static=True)
-    max_speed: float = eqx.field(static=True)
+    reach: Reach = eqx.field(static=True)
+
+    @property
+    def slots(self) -> tuple[str, ...]:
+        """Families that a command can address."""
+        return slots_of(self.reach)
 
     def __call__(self, joints: Float[AnyArray, "*batch joint"], command: Command) -> Float[AnyArray, "*batch action"]:
         """Joint action in [-1, 1]."""
-        return self.actor(tracker_observation(joints, command, self.max_distance, self.max_speed))
+        return self.actor(tracker_observation(joints, command, self.reach))
+
+
+def slots_of(reach: Reach) -> tuple[str, ...]:
+    """Families that a robot of that reach can be commanded in, by index."""
+    return ("goal", "velocity") if reach.pitch is None else ("goal", "velocity", "stand")
+
+
+def relative(subgoal: Subgoal, x: Float[AnyArray, "*batch"], pitch: Float[AnyArray, "*batch"]) -> Command:
+    """A subgoal as the robot sees it now: a goal is a point in the world, so its distance shrinks [m, rad]."""
+    here = jnp.where(subgoal.slot == GOAL, x, jnp.where(subgoal.slot == STAND, pitch, 0.0))
+    return Command(subgoal.slot, subgoal.value - here)
+
+
+def after(command: Command, motion: Motion) -> Command:
+    """The same subgoal as it is seen after a motion."""
+    done = jnp.where(command.slot == GOAL, motion.displacement, 0.0)
+    done = jnp.where(command.slot == STAND, motion.turn, done)
+    return Command(command.slot, command.value - done)
 
 
 def tracker_observation(
-    joints: Float[AnyArray, "*batch joint"], command: Command, max_distance: float, max_speed: float
+    joints: Float[AnyArray, "*batch joint"], command: Command, reach: Reach
 ) -> Float[AnyArray, "*batch feature"]:
-    """Joint state and command, the goal on three scales so that centimetres count as metres do."""
-    is_goal = (command.slot == GOAL).astype(joints.dtype)
-    ahead = is_goal * jnp.clip(command.value, -max_distance, max_distance)
-    speed = (1 - is_goal) * jnp.clip(command.value, -max_speed, max_speed)
-    features = [is_goal, 1 - is_goal, ahead / max_distance, jnp.tanh(2 * ahead), jnp.tanh(10 * ahead), speed]
+    """Joint state and command, what is to be reached on three scales so that centimetres count as metres do."""
+    far, (slowest, fastest) = MARGIN * reach.distance, (MARGIN * limit for limit in reach.speed)
+    is_slot = [(command.slot == slot).astype(joints.dtype) for slot in range(len(slots_of(reach)))]
+    ahead = is_slot[0] * jnp.clip(command.value, -far, far)
+    speed = is_slot[1] * jnp.clip(command.value, slowest, fastest)
+    features = [*is_slot, ahead / far, jnp.tanh(2 * ahead), jnp.tanh(10 * ahead), speed]
+    if reach.pitch is not None:
+        turn = is_slot[STAND] * command.value
+        features += [turn, jnp.tanh(2 * turn), jnp.tanh(10 * turn)]
     return jnp.concatenate([joints, jnp.stack(features, axis=-1)], axis=-1)
 
 
 def tracker_reward(
     command: Command,
-    displacement: Float[AnyArray, "*batch"],
+    motion: Motion,
     control_dt: float,
-    pitch: Float[AnyArray, "*batch"],
     action: Float[AnyArray, "*batch action"],
+    reach: Reach,
     weights: TrackerReward,
 ) -> Float[AnyArray, "*batch"]:
-    """Pay for one control step that moved the robot by `displacement` [m] and left it at `pitch` [rad].
+    """Pay for one control step of `control_dt` seconds.
 
-    Linear in the error, so that standing still is never the best answer to a speed; a pull on arrival.
+    Linear in the error, absolute or relative, so that standing still is never the best answer to a speed; a pull on
+    arrival.
     """
-    miss = jnp.abs(command.value - displacement)
-    goal = weights.arrival * 0.1 / (0.1 + miss) - weights.distance * miss
-    velocity = -weights.speed * jnp.abs(command.value - displacement / control_dt)
-    posture = -weights.upright * (1 - jnp.cos(pitch)) - weights.energy * jnp.mean(action**2, axis=-1)
-    return jnp.where(command.slot == GOAL, goal, velocity) + posture
+    left = after(command, motion).value
+    miss, velocity = jnp.abs(left), motion.displacement / control_dt
+    is_goal, is_stand = command.slot == GOAL, command.slot == STAND
+    arrival = weights.arrival * 0.1 / (0.1 + miss)
+    goal = arrival - weights.distance * miss
+    stand = arrival - weights.turn * miss
+    linear = jnp.where(is_goal, goal, -weights.speed * jnp.abs(command.value - velocity))
+    if weights.relative:
+        slowest, fastest = reach.speed
+        wanted = jnp.where(is_goal, jnp.clip(1.5 * left, slowest, fastest), command.value)
+        relative_error = jnp.abs(wanted - velocity) / jnp.maximum(jnp.abs(wanted), 0.5)
+        linear = weights.relative * jnp.maximum(1 - relative_error, -0.5) + jnp.where(is_goal, arrival, 0.0)
+    posture = jnp.where(is_stand, 0.0, weights.upright * (1 - jnp.cos(motion.pitch)))
+    posture = posture + weights.energy * jnp.mean(action**2, axis=-1)
+    alive = weights.alive * (1.0 - motion.fell)
+    return jnp.where(is_stand, stand, linear) - posture + alive

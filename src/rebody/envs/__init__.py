@@ -2,16 +2,29 @@
 
 import gymnasium
 
-_EPISODE_STEPS = {"PointMass": 200, "HalfCheetah": 400}
-"""Steps in 20 simulated seconds."""
+_ROBOTS = {"HalfCheetah": ("cheetah", 0.05), "Hopper": ("hopper", 0.02), "Walker2d": ("walker", 0.02)}
+"""What Gymnasium calls a robot: its name here, and its control step [s]."""
+_SECONDS, _DECISION_DT = 20.0, 0.1
 
 
 def register_environments() -> None:
-    """Tell Gymnasium where `rebody/PointMass-v0` and `rebody/HalfCheetah-v0` are; they load when made."""
-    for name, steps in _EPISODE_STEPS.items():
+    """Tell Gymnasium where `rebody/PointMass-v0`, `rebody/HalfCheetah-v0` ... are; they load when made."""
+    _register("PointMass", "PointMass", _DECISION_DT, {})
+    for name, (robot, control_dt) in _ROBOTS.items():
+        _register(name, "Robot", control_dt, {"robot": robot})
         gymnasium.register(
-            f"rebody/{name}-v0",
-            entry_point=f"rebody.envs.shipped:{name}Env",
-            vector_entry_point=f"rebody.envs.shipped:{name}VectorEnv",
-            max_episode_steps=steps,
+            f"rebody/{name}Tracker-v0",
+            entry_point="rebody.training.tracker.env:TrackerEnv",
+            kwargs={"robot": robot},
+            max_episode_steps=round(_SECONDS / control_dt),
         )
+
+
+def _register(name: str, kind: str, step_s: float, settings: dict[str, str]) -> None:
+    gymnasium.register(
+        f"rebody/{name}-v0",
+        entry_point=f"rebody.envs.shipped:{kind}Env",
+        vector_entry_point=f"rebody.envs.shipped:{kind}VectorEnv",
+        kwargs=settings,
+        max_episode_steps=round(_SECONDS / step_s),
+    )

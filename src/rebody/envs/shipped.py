@@ -4,13 +4,12 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from rebody.bodies import load_robot
+from rebody.bodies import RobotSpec, load_robot
 from rebody.envs.bodies import PointMasses, Robots
 from rebody.envs.single import TaskEnv
 from rebody.envs.vector import TaskVectorEnv
 
 _POINT_MASS = {"render_modes": ["rgb_array"], "render_fps": 10}
-_CHEETAH = {"render_modes": ["rgb_array"], "render_fps": 20}
 _NEXT_STEP = {"autoreset_mode": AutoresetMode.NEXT_STEP}
 
 
@@ -34,21 +33,25 @@ class PointMassVectorEnv(TaskVectorEnv):
         super().__init__(PointMasses(num_envs), **settings)
 
 
-class HalfCheetahEnv(TaskEnv):
-    """HalfCheetah: observation qpos with x, then qvel; six joint actions; steps of 0.05 s."""
+class RobotEnv(TaskEnv):
+    """A robot: observation qpos with x, then qvel; an action per actuator; a step is its control step."""
 
-    metadata = _CHEETAH
+    def __init__(self, robot: str, **settings: Any):
+        """`robot` is a shipped name or the path of a TOML file; settings as `TaskEnv` has them."""
+        spec = load_robot(robot)
+        self.metadata = _robot_metadata(spec)
+        super().__init__(Robots(spec, 1, threads=1), **settings)
 
-    def __init__(self, **settings: Any):
-        """Settings as `TaskEnv` has them."""
-        super().__init__(Robots(load_robot("cheetah"), 1, threads=1), **settings)
+
+class RobotVectorEnv(TaskVectorEnv):
+    """Many robots, stepped on several threads."""
+
+    def __init__(self, robot: str, num_envs: int = 1, threads: int = 0, **settings: Any):
+        """`threads` = 0 uses every processor; the rest as for `RobotEnv` and `TaskVectorEnv`."""
+        spec = load_robot(robot)
+        self.metadata = _robot_metadata(spec) | _NEXT_STEP
+        super().__init__(Robots(spec, num_envs, threads), **settings)
 
 
-class HalfCheetahVectorEnv(TaskVectorEnv):
-    """Many HalfCheetahs, stepped on several threads."""
-
-    metadata = _CHEETAH | _NEXT_STEP
-
-    def __init__(self, num_envs: int = 1, threads: int = 0, **settings: Any):
-        """`threads` = 0 uses every processor; settings as `TaskVectorEnv` has them."""
-        super().__init__(Robots(load_robot("cheetah"), num_envs, threads), **settings)
+def _robot_metadata(spec: RobotSpec) -> dict[str, Any]:
+    return {"render_modes": ["rgb_array"], "render_fps": round(1 / spec.control_dt)}

@@ -7,12 +7,13 @@ import numpy as np
 from jaxtyping import Int
 
 from rebody.agents.agent import Agent
-from rebody.agents.build import HORIZON, build_agent, check_agent, check_fit
+from rebody.agents.build import HORIZON, SlotsBy, build_agent, check_agent, check_fit, slot_chooser
 from rebody.agents.controller import Controller, FlatController, TrackerController
-from rebody.agents.parts import Inference, LoadedFlat, LoadedTracker
+from rebody.agents.parts import Inference, LoadedFlat, LoadedSlots, LoadedTracker
 from rebody.agents.rollout import Episodes, OnFrame, rollout_on_robot, rollout_on_toy
 from rebody.bodies import RobotSpec
 from rebody.bodies.toys import Toy
+from rebody.control.tracker import slots_of
 from rebody.errors import RebodyError
 from rebody.evaluation.results import Results, episode_results
 from rebody.store import tree_hash
@@ -34,6 +35,9 @@ class Trial:
     tracker: LoadedTracker | None
     flat: LoadedFlat | None = None
     """The policy of agent `flat`."""
+    slots: LoadedSlots | None = None
+    """What chooses the slots of `reuse` on a robot, for a module of several families."""
+    slots_by: SlotsBy = "classifier"
     toy: Toy | None = None
     """A point mass other than the one that the module learned on."""
     seconds: float = 20.0
@@ -86,7 +90,10 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
 def trial_agent(trial: Trial, tasks: Task) -> Agent:
     """The agent of a trial; `tasks` are the active ones, [time, episode], which `oracle` is told."""
     stride = 1 if trial.thesis else trial.stride
-    return build_agent(trial.agent, trial.inference, tasks, stride=stride, horizon=trial.horizon)
+    slots = None
+    if trial.agent == "reuse" and trial.robot is not None:
+        slots = slot_chooser(trial.inference, trial.slots, trial.slots_by)
+    return build_agent(trial.agent, trial.inference, tasks, slots=slots, stride=stride, horizon=trial.horizon)
 
 
 def run_trial(trial: Trial, agent: Agent, tasks: Task, seeds: np.ndarray) -> Episodes:
@@ -115,8 +122,7 @@ def _clusters(trial: Trial, episodes: Episodes) -> Int[np.ndarray, "time episode
     mixture, latent = trial.inference.parts.mixture, episodes.belief.mean
     if mixture is None or trial.agent == "bayes":
         return np.zeros(latent.shape[:2], int)
-    clustered = latent[..., : mixture.mean.shape[-1]]
-    return np.asarray(mixture.responsibilities(clustered)).argmax(axis=-1)
+    return np.asarray(mixture.component(latent))
 
 
 def _controller(trial: Trial) -> Controller:
@@ -141,7 +147,8 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
         if trial.agent == "flat":
             raise RebodyError("agent 'flat' moves the joints of a robot, and a point mass has none.")
         return
-    check_fit(trial.agent, trial.inference, trial.robot.name, trial.robot.moving_fields)
+    slots = trial.tracker.tracker.slots if trial.tracker else slots_of(trial.robot.reach)
+    check_fit(trial.agent, trial.inference, trial.robot.name, trial.robot.moving_fields, slots)
     for part in (trial.tracker, trial.flat):
         if part is not None and part.robot != trial.robot.name:
             raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{trial.robot.name}'.")

@@ -53,6 +53,16 @@ class InferenceConfig:
     decoded: int = 8
     """Transitions of the same episode that each belief must explain."""
 
+    @property
+    def clustered(self) -> int:
+        """Dimensions of the latent that a mixture clusters: those that say what kind of task it is."""
+        return self.kinds or self.latent
+
+    @property
+    def interpreted(self) -> int:
+        """Size of a belief as a policy sees it (`Decoder.interpret`)."""
+        return 2 * len(self.fields) if self.kinds else self.latent
+
 
 class InferenceModule(eqx.Module):
     """Encoder and decoder; frozen once trained."""
@@ -111,10 +121,10 @@ def loss(
     shape = (*latent.shape[:2], config.decoded)
     latents = jnp.broadcast_to(latent[:, :, None], (*shape, config.latent))
     predicted = decoder.reward(jnp.broadcast_to(after[:, None], (*shape, after.shape[-1])), latents)
-    wanted = evidence.reward[:, None] / encoder.reward_scale
+    wanted = jnp.broadcast_to(evidence.reward[:, None] / encoder.reward_scale, shape)
     share = evidence.same_task / jnp.maximum(jnp.sum(evidence.same_task), 1)
     reward_loss = jnp.sum(share * _weighted_negative_log_likelihood(wanted, predicted))
-    reward_error = jnp.sum(share * (wanted - predicted.mean) ** 2)
+    reward_error = jnp.sum(share * (wanted - predicted.expectation) ** 2)
 
     reconstruction = reward_loss + config.state_weight * state_error
     if module.labeller is not None:
@@ -130,11 +140,10 @@ def loss(
 
 
 def _weighted_negative_log_likelihood(wanted, predicted):
-    """Gaussian likelihood with a learned sigma in place of the constant of thesis (5.2).
+    """Likelihood with a learned sigma in place of the constant of thesis (5.2).
 
     A constant lets the first decisions of an episode, when nothing can be known, rule the loss; weighting
     by sigma (beta-NLL, Seitzer et al. 2022, beta = 1/2) keeps the gradient of the sure ones in bounds.
     """
-    squared = (wanted - predicted.mean) ** 2
-    negative_log_likelihood = 0.5 * (squared * jnp.exp(-predicted.log_variance) + predicted.log_variance)
-    return jax.lax.stop_gradient(jnp.exp(0.5 * predicted.log_variance)) * negative_log_likelihood
+    sigma = jnp.exp(0.5 * predicted.log_variance)
+    return -jax.lax.stop_gradient(sigma) * predicted.log_likelihood(wanted)

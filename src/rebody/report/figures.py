@@ -10,16 +10,23 @@ from rebody.evaluation.results import EpisodeResult, Results
 from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TASKS, TRUTH, figure
 from rebody.tasks import FAMILIES
 
+FAMILY_COLOURS = (MOTION, BELIEF, IDLE)
+
 
 def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) -> None:
-    """Trajectories, latents against targets, and errors of three agents, side by side."""
-    with figure(path, 1, 3, size=(14.0, 4.2)) as (drawing, (motion, latent, errors)):
-        _trajectories(motion, results)
-        _latents(latent, results)
-        _errors(errors, {"reuse": results, "oracle": oracle, "idle": idle})
+    """Trajectories and errors of each family, and what was believed, of three agents on the same tasks."""
+    families = sorted({episode.active_family[-1] for episode in results.episodes})
+    columns = len(families) + 1
+    with figure(path, 2, columns, size=(4.7 * columns, 7.4)) as (drawing, panels):
+        for i, family in enumerate(families):
+            _trajectories(panels[i], _of(family, results))
+            agents = {"reuse": results, "oracle": oracle, "idle": idle}
+            _errors(panels[columns + i], {name: _of(family, of) for name, of in agents.items()}, family)
+        _latents(panels[columns - 1], results, families)
+        _readings(panels[-1], results, families)
         drawing.suptitle(
             f"Inference module '{results.inference}', trained on a point mass, on the {results.robot}: "
-            "the target is told to nobody but the oracle"
+            "the task is told to nobody but the oracle"
         )
 
 
@@ -57,39 +64,57 @@ def _reached(episode: EpisodeResult) -> list[float]:
     return series[episode.active_family[-1]]
 
 
-def _trajectories(axes: Axes, results: Results) -> None:
-    largest = max(abs(e.active_target[-1]) for e in results.episodes) or 1.0
-    for episode in results.episodes:
+def _of(family: str, results: Results) -> list[EpisodeResult]:
+    return [episode for episode in results.episodes if episode.active_family[-1] == family]
+
+
+def _trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:
+    largest, family = max(abs(e.active_target[-1]) for e in episodes) or 1.0, episodes[0].active_family[-1]
+    for episode in episodes:
         colour = plt.get_cmap(TASKS)(0.5 + 0.5 * episode.active_target[-1] / largest)
         axes.plot(episode.time_s, _reached(episode), color=colour, lw=1.2)
         axes.plot(episode.time_s[-1], episode.active_target[-1], "o", color=colour, ms=4, clip_on=False)
-    family = results.episodes[0].active_family[-1]
-    axes.set(xlabel="time [s]", ylabel=f"{family} [{_unit(family)}]", title="robot (lines), hidden targets (dots)")
+    axes.set(xlabel="time [s]", ylabel=f"{family} [{_unit(family)}]", title=f"{family}: robot (lines), targets (dots)")
 
 
-def _latents(axes: Axes, results: Results) -> None:
-    targets = [episode.active_target[-1] for episode in results.episodes]
-    final = np.array([episode.latent[-1] for episode in results.episodes])
-    for dimension in range(final.shape[1]):
-        axes.plot(targets, final[:, dimension], ".", label=f"latent {dimension + 1}")
-    axes.set(
-        xlabel=f"hidden target [{_unit(results.episodes[0].active_family[-1])}]",
-        ylabel="latent mean at the end",
-        title="what it believes against what is true",
-    )
+def _latents(axes: Axes, results: Results, families: list[str]) -> None:
+    """Against the target where there is one family; which of several it is shows in the latent's first numbers."""
+    for family, colour in zip(families, FAMILY_COLOURS, strict=False):
+        of = _of(family, results)
+        final = np.array([episode.latent[-1] for episode in of])
+        if len(families) > 1:
+            axes.plot(final[:, 0], final[:, 1], ".", color=colour, label=family)
+            continue
+        for dimension in range(final.shape[1]):
+            axes.plot([e.active_target[-1] for e in of], final[:, dimension], ".", label=f"latent {dimension + 1}")
+    if len(families) > 1:
+        axes.set(xlabel="latent 1", ylabel="latent 2", title="the belief at the end: what kind of task")
+    else:
+        axes.set(xlabel=f"hidden target [{_unit(families[0])}]", ylabel="latent mean", title="the belief at the end")
     axes.legend(frameon=False)
 
 
-def _errors(axes: Axes, agents: dict[str, Results]) -> None:
+def _readings(axes: Axes, results: Results, families: list[str]) -> None:
+    """What a linear probe reads from the last belief, over what is true."""
+    for family, colour in zip(families, FAMILY_COLOURS, strict=False):
+        of = _of(family, results)
+        truth = [episode.active_target[-1] for episode in of]
+        read = [episode.inferred_target[-1] for episode in of]
+        axes.plot(truth, read, "o", color=colour, mfc="none", label=f"{family} [{_unit(family)}]")
+    axes.axline((0, 0), slope=1, color=TRUTH, lw=0.7)
+    axes.set(xlabel="hidden target", ylabel="read from the belief", title="the belief at the end: how much")
+    axes.legend(frameon=False)
+
+
+def _errors(axes: Axes, agents: dict[str, list[EpisodeResult]], family: str) -> None:
     colours = {"reuse": MOTION, "oracle": ORACLE, "idle": IDLE}
-    for name, results in agents.items():
-        errors = np.sort([max(episode.final_error, 1e-3) for episode in results.episodes])
+    for name, episodes in agents.items():
+        errors = np.sort([max(episode.final_error, 1e-3) for episode in episodes])
         share = np.arange(1, len(errors) + 1) / len(errors)
         axes.step(errors, 100 * share, where="post", label=name, color=colours[name])
-    unit = _unit(next(iter(agents.values())).episodes[0].active_family[-1])
     axes.set(
         xscale="log",
-        xlabel=f"final error [{unit}]",
+        xlabel=f"{family}: final error [{_unit(family)}]",
         ylabel="episodes with at most this error [%]",
         title="what inference brings",
     )

@@ -58,11 +58,15 @@ def base_task(task: Task) -> Int[AnyArray, "*batch"]:
     return 2 * task.family + (task.target > 0)
 
 
+def achieved(family: Int[AnyArray, "*batch"], state: GlobalState) -> Float[AnyArray, "*batch"]:
+    """The number of each state that its family compares with a target, in the family's unit."""
+    of_all = jnp.stack([each.achieved(state) for each in FAMILIES], axis=-1)
+    return jnp.take_along_axis(of_all, family[..., None], axis=-1)[..., 0]
+
+
 def reward(task: Task, state: GlobalState, form: RewardForm) -> Float[AnyArray, "*batch"]:
     """Reward of the decision that led to `state`: never a control cost, never an alive bonus."""
-    achieved = jnp.stack([family.achieved(state) for family in FAMILIES], axis=-1)
-    of_task = jnp.take_along_axis(achieved, task.family[..., None], axis=-1)[..., 0]
-    error = jnp.abs(of_task - task.target)
+    error = jnp.abs(achieved(task.family, state) - task.target)
     if form == "plain":
         return -error
     floors = jnp.asarray([family.floor for family in FAMILIES])

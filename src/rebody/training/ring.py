@@ -12,6 +12,11 @@ def write(ring: Tree, first: int, rows: Tree) -> None:
         old[(first + np.arange(len(new))) % len(old)] = new
 
 
+def newest(ring: Tree, written: int, rows: int) -> Tree:
+    """The last rows of which `written` were ever written."""
+    return jax.tree.map(lambda leaf: leaf[(written - rows + np.arange(rows)) % len(leaf)], ring)
+
+
 def draw(ring: Tree, written: int, shape: tuple[int, ...], rng: np.random.Generator) -> Tree:
     """Rows drawn evenly with replacement, of which `written` were ever written."""
     size = len(jax.tree.leaves(ring)[0])

@@ -126,9 +126,9 @@ def test_where_the_latent_is_split_kinds_alone_are_clustered(settings):
     both = jax.tree.map(lambda kind, amount: jnp.concatenate([kind, jnp.abs(amount)], axis=-1), episodes.belief,
                         Belief(amounts, amounts))  # fmt: skip
     clusters, figures = refit(
-        no_clusters(8, split.clustered), replace(episodes, belief=both), split, np.random.default_rng(0)
+        no_clusters(8, split.inference.clustered), replace(episodes, belief=both), split, np.random.default_rng(0)
     )
-    assert (settings.clustered, split.clustered) == (2, 2)
+    assert (settings.inference.clustered, split.inference.clustered) == (2, 2)
     assert clusters.prior.mean.shape == (8, 2)
     assert figures["mixture/components"] == 3
     assert figures["mixture/purity"] == 1.0

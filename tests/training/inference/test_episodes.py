@@ -20,7 +20,7 @@ TOY = MassDamper()
 @pytest.fixture(scope="module")
 def episodes(config, state):
     """Episodes of every role."""
-    return collect(state.module.encoder, state.sac.actor, TOY, config, roles(8, False), jax.random.key(1))
+    return collect(state.module, state.sac.actor, TOY, config, roles(8, False), jax.random.key(1))
 
 
 def test_roles_are_quarters(config):
@@ -61,7 +61,7 @@ def test_each_decision_is_paid_for_the_task_that_is_on(config, state):
     """In every episode the task changes, and nothing but the rewards tells."""
     switching, steady = (
         collect(
-            state.module.encoder, state.sac.actor, TOY, replace(config, switch_share=share), roles(8, True),
+            state.module, state.sac.actor, TOY, replace(config, switch_share=share), roles(8, True),
             jax.random.key(5),
         )
         for share in (1.0, 0.0)
@@ -88,7 +88,7 @@ def test_the_first_half_is_nominal_and_moves_by_its_actions(episodes, config):
 def test_on_the_position_toy_a_step_is_a_tenth_of_a_metre_at_most(config, state):
     calm = replace(config, randomisation=Randomisation(0.0, lag=0.0, gain=(1.0, 1.0)), start=(12.0, 0.0))
     key = jax.random.key(4)
-    moved = collect(state.module.encoder, state.sac.actor, make_toy("position"), calm, roles(8, True), key)
+    moved = collect(state.module, state.sac.actor, make_toy("position"), calm, roles(8, True), key)
     np.testing.assert_allclose(np.diff(moved.state.x, axis=1), 0.1 * moved.action[..., 0], atol=1e-5)
 
 
@@ -115,7 +115,7 @@ def test_those_who_wander_hold_their_actions(episodes):
 
 def test_episodes_start_anywhere_at_any_speed(config, state):
     wide = replace(config, episodes=400, decisions=1, start=(5.0, 2.0))
-    started = collect(state.module.encoder, state.sac.actor, TOY, wide, roles(400, True), jax.random.key(2)).state
+    started = collect(state.module, state.sac.actor, TOY, wide, roles(400, True), jax.random.key(2)).state
     for begun, limit in ((started.x[:, 0], 5.0), (started.vx[:, 0], 2.0)):
         assert 0.97 * limit < np.abs(begun).max() <= limit
         assert abs(np.mean(begun)) < 0.15 * limit
@@ -176,7 +176,7 @@ def stood(standing):
     """Episodes of the full toy, and the encoder that believed along them."""
     begun = initial_state(standing, FullToy(), jax.random.key(0))
     encoder = begun.module.encoder
-    return encoder, collect(encoder, begun.sac.actor, FullToy(), standing, roles(8, False), jax.random.key(1))
+    return encoder, collect(begun.module, begun.sac.actor, FullToy(), standing, roles(8, False), jax.random.key(1))
 
 
 def test_the_full_toy_acts_in_three_ways_and_is_paid_for_its_pitch(stood, standing):
@@ -210,7 +210,7 @@ def test_without_a_window_refreshed_beliefs_are_those_made_while_collecting(stoo
 def test_a_full_toy_starts_at_any_pitch_that_it_can_hold(standing):
     wide = replace(standing, episodes=400, decisions=1)
     begun = initial_state(wide, FullToy(), jax.random.key(0))
-    started = collect(begun.module.encoder, begun.sac.actor, FullToy(), wide, roles(400, True), jax.random.key(2)).state
+    started = collect(begun.module, begun.sac.actor, FullToy(), wide, roles(400, True), jax.random.key(2)).state
     pitch = np.asarray(started.pitch)[:, 0]
     assert 0.97 * 2.25 < np.abs(pitch).max() <= 2.25
     assert abs(pitch.mean()) < 0.15 * 2.25
@@ -223,8 +223,7 @@ def test_observations_can_be_noisy(config, state):
     calm = replace(config, episodes=100, decisions=20, randomisation=Randomisation(0.0, lag=0.0, gain=(1.0, 1.0)))
     noisy = replace(calm, observation_noise=0.04)
     clean, rough = (
-        collect(state.module.encoder, state.sac.actor, TOY, c, roles(100, True), jax.random.key(3))
-        for c in (calm, noisy)
+        collect(state.module, state.sac.actor, TOY, c, roles(100, True), jax.random.key(3)) for c in (calm, noisy)
     )
     np.testing.assert_array_equal(clean.action, rough.action)  # wanderers do not look
     np.testing.assert_array_equal(clean.reward, rough.reward)  # paid for where they are, not where they seem

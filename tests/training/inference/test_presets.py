@@ -42,7 +42,7 @@ def test_tasks_can_be_done_by_the_toy(preset):
 
 def test_a_split_latent_has_room_for_amounts(preset):
     assert 0 <= preset.inference.kinds < preset.inference.latent
-    assert preset.clustered == (preset.inference.kinds or preset.inference.latent)
+    assert preset.inference.clustered == (preset.inference.kinds or preset.inference.latent)
     assert preset.inference.window is None or preset.inference.window <= preset.decisions
 
 

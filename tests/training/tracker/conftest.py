@@ -4,16 +4,24 @@ import numpy as np
 import pytest
 
 from rebody.bodies import RobotBatch
+from rebody.bodies.robot import Reach
 from rebody.control.sac import SACConfig
 from rebody.training.tracker import TrackerConfig
 
+REACH = Reach(speed=(-3.0, 3.0))
 ROBOTS, STEPS, ROWS = 3, 4, 29  # a ring that is no multiple of the twelve rows of a turn
 
 
 @pytest.fixture
 def config():
     return TrackerConfig(
-        robots=ROBOTS, steps=STEPS, updates=5, replay=ROWS, sac=SACConfig(hidden=(8, 8), batch_size=16)
+        reach=REACH,
+        robots=ROBOTS,
+        steps=STEPS,
+        updates=5,
+        replay=ROWS,
+        push=0.0,
+        sac=SACConfig(hidden=(8, 8), batch_size=16),
     )
 
 

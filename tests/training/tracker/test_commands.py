@@ -1,11 +1,14 @@
 """What a tracker is asked to do while it learns."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from rebody.bodies.robot import Reach
 from rebody.bodies.toys import MassDamper
-from rebody.tasks import GOAL, VELOCITY
+from rebody.control.tracker import MARGIN
+from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.training.tracker.commands import CommandDistribution, ToyGuide, _scripted_action
 from rebody.types import GlobalState, Task
 
@@ -16,8 +19,9 @@ ROUGHLY = 0.01  # four standard deviations of a share
 @pytest.fixture(scope="module")
 def drawn():
     """(goals [m], speeds [m/s]) of a distribution that is not the default one."""
-    distribution = CommandDistribution(max_distance=4.0, max_speed=2.0, near_share=0.3, zero_share=0.2)
-    command = distribution.sample(jax.random.key(0), (DRAWN,))
+    distribution = CommandDistribution(near_share=0.3, zero_share=0.2)
+    reach = Reach(speed=(-2.0 / MARGIN, 2.0 / MARGIN), distance=4.0 / MARGIN)
+    command = distribution.sample(jax.random.key(0), jnp.zeros(DRAWN), reach)
     slot, value = np.asarray(command.slot), np.asarray(command.value)
     assert set(slot) == {GOAL, VELOCITY}
     return value[slot == GOAL], value[slot == VELOCITY]
@@ -85,3 +89,36 @@ def test_a_guide_one_decision_ahead_is_nearby():
 def test_the_scripted_toy_arrives(family, target, within):
     guide = ToyGuide(Task(np.array([family]), np.array([target], np.float32)), np.array([60]))
     np.testing.assert_allclose(guide.subgoal(robots_at([0.0], [1.0]), 60).value, target, atol=within)
+
+
+LOPSIDED = Reach(speed=(-1.0, 3.0), distance=4.0, pitch=(-0.5, 1.5))
+
+
+@pytest.fixture(scope="module")
+def lopsided():
+    """(pitch of each robot, command) of a robot that can do more one way than the other."""
+    pitch = np.linspace(-2.0, 2.0, DRAWN).astype(np.float32)
+    return pitch, CommandDistribution(zero_share=0.2).sample(jax.random.key(0), pitch, LOPSIDED)
+
+
+@pytest.mark.parametrize(("slot", "ends"), [(VELOCITY, LOPSIDED.speed), (STAND, LOPSIDED.pitch)])
+def test_a_lopsided_range_is_filled_evenly_from_end_to_end(lopsided, slot, ends):
+    pitch, command = lopsided
+    asked = np.asarray(command.value + (pitch if slot == STAND else 0.0))[command.slot == slot]
+    still = np.abs(asked) < 1e-6
+    assert np.mean(still) == pytest.approx(0.2, abs=2 * ROUGHLY)
+    expected = np.linspace(MARGIN * ends[0], MARGIN * ends[1], np.sum(~still))
+    assert np.abs(np.sort(asked[~still]) - expected).max() < 0.05
+
+
+def test_a_robot_that_stands_is_asked_to_in_a_third_of_its_commands(lopsided):
+    _, command = lopsided
+    for slot in (GOAL, VELOCITY, STAND):
+        assert np.mean(command.slot == slot) == pytest.approx(1 / 3, abs=ROUGHLY)
+
+
+def test_a_wanted_pitch_does_not_depend_on_the_robots_own(lopsided):
+    pitch, command = lopsided
+    stands = np.asarray(command.slot) == STAND
+    assert abs(np.corrcoef(pitch[stands], (command.value + pitch)[stands])[0, 1]) < 0.05
+    assert np.corrcoef(pitch[stands], command.value[stands])[0, 1] < -0.5

@@ -1,12 +1,16 @@
 """Orders: points in the world that last for a while."""
 
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
 
-from rebody.tasks import GOAL, VELOCITY
+from rebody.control.tracker import MARGIN
+from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.training.tracker.commands import ToyGuide
 from rebody.training.tracker.orders import commands, follow_guides, no_orders, renew
+from rebody.training.tracker.schedule import schedule
 from rebody.types import Task
 
 
@@ -15,7 +19,8 @@ def move_to(batch, x):
 
 
 def give(orders, batch, config, seed):
-    renew(orders, batch, config, np.random.default_rng(seed), jax.random.key(seed))
+    lasting = schedule(config, 0, batch.spec.control_dt)
+    renew(orders, batch, config, lasting, np.random.default_rng(seed), jax.random.key(seed))
 
 
 def copy(orders):
@@ -30,13 +35,13 @@ def ordered(batch, config):
         orders = no_orders(config.robots)
         give(orders, batch, config, seed)
         if len(set(orders.slot)) == 2:
-            return orders, commands(orders, batch.x)
+            return orders, commands(orders, batch)
     raise AssertionError("no draw with both slots")
 
 
 def test_orders_are_given_at_once_and_within_reach(ordered, config):
     orders, seen = ordered
-    limits = np.where(seen.slot == GOAL, config.commands.max_distance, config.commands.max_speed)
+    limits = MARGIN * np.where(seen.slot == GOAL, config.reach.distance, config.reach.speed[1])
     assert (np.abs(seen.value) <= limits).all()
     assert (orders.steps_left > 0).all()
 
@@ -46,7 +51,7 @@ def test_a_goal_stays_where_it_is_in_the_world(ordered, batch):
     world = np.where(orders.slot == GOAL, 100.0 + seen.value, seen.value)
     np.testing.assert_allclose(orders.value, world, rtol=1e-6)
     move_to(batch, np.array([99.0, 101.5, 103.0]))
-    later = commands(orders, batch.x)
+    later = commands(orders, batch)
     np.testing.assert_array_equal(later.slot, seen.slot)
     nearer = np.where(seen.slot == GOAL, np.array([-1.0, 1.5, 3.0]), 0.0)
     np.testing.assert_allclose(later.value, seen.value - nearer, atol=2e-5)
@@ -107,3 +112,36 @@ def test_only_guided_robots_are_told_where_their_toy_will_be(ordered, batch, con
     assert 100.0 < orders.value[0] < 102.0
     assert orders.value[1] == before.value[1]
     np.testing.assert_array_equal(orders.steps_left, before.steps_left)
+
+
+@pytest.fixture
+def standing(batch, config):
+    """Settings of robots that are asked to stand, too, at the pitches of `batch`."""
+    batch.qpos[:, batch.spec.root_addresses[2]] = (0.3, -0.8, 0.0)
+    return replace(config, reach=replace(config.reach, pitch=(-1.0, 0.5)), guided_share=1.0)
+
+
+def test_a_wanted_pitch_stays_where_it_is_in_the_world(batch, standing):
+    wanted = []
+    for seed in range(40):
+        orders = no_orders(standing.robots)
+        give(orders, batch, standing, seed)
+        stands = orders.slot == STAND
+        wanted.extend(orders.value[stands])
+        assert not orders.guided[stands].any()  # a point mass does not pitch
+        assert orders.guided[~stands].all()
+        turned = orders.value - np.array([0.3, -0.8, 0.0])
+        np.testing.assert_allclose(commands(orders, batch).value[stands], turned[stands], atol=1e-5)
+    assert -MARGIN * 1.0 <= min(wanted) < -0.8
+    assert 0.4 < max(wanted) <= MARGIN * 0.5
+
+
+def test_an_order_that_is_carried_out_makes_room_for_another(batch, config):
+    """In the thesis' curriculum, when robots have learned to last."""
+    lasting = replace(schedule(config, 0, batch.spec.control_dt), change_when_reached=1.0)
+    orders = no_orders(config.robots)
+    orders.slot[:], orders.steps_left[:] = (GOAL, GOAL, VELOCITY), 50
+    orders.value[:] = (batch.x[0] + 0.05, batch.x[1] + 0.5, batch.qvel[2, 0] + 0.05)
+    before = orders.value.copy()
+    renew(orders, batch, config, lasting, np.random.default_rng(0), jax.random.key(0))
+    np.testing.assert_array_equal(orders.value != before, [True, False, True])

@@ -6,7 +6,8 @@ import jax
 import numpy as np
 import pytest
 
-from rebody.tasks import GOAL, VELOCITY
+from rebody.control.tracker import MARGIN, Command, Motion
+from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.training.tracker import train
 from rebody.training.tracker.train import Replay, collect, initial_state, relabel
 
@@ -55,13 +56,15 @@ def test_rows_of_the_ring_belong_together(batch, config, counted):
     for number in range(seen - config.replay, seen - config.robots):
         here, after = number % config.replay, (number + config.robots) % config.replay
         np.testing.assert_array_equal(ring.next_joints[here], ring.joints[after])
-        if ring.slot[here] == ring.slot[after] == GOAL and not state.orders.guided.any():
-            np.testing.assert_allclose(ring.value[here] - ring.displacement[here], ring.value[after], atol=1e-5)
+        if ring.command.slot[here] == ring.command.slot[after] == GOAL and not state.orders.guided.any():
+            np.testing.assert_allclose(
+                ring.command.value[here] - ring.motion.displacement[here], ring.command.value[after], atol=1e-5
+            )
     last = (seen - config.robots + np.arange(config.robots)) % config.replay
     np.testing.assert_array_equal(ring.next_joints[last], batch.spec.joint_state(batch.qpos, batch.qvel))
-    np.testing.assert_allclose(ring.pitch[last], batch.spec.pitch(batch.qpos), rtol=1e-6)
+    np.testing.assert_allclose(ring.motion.pitch[last], batch.spec.pitch(batch.qpos), rtol=1e-6)
     for number in range(seen - config.replay, seen):
-        moved[number % config.robots] += ring.displacement[number % config.replay]
+        moved[number % config.robots] += ring.motion.displacement[number % config.replay]
     assert np.abs(batch.x - x).max() > 0
     assert (np.abs(moved) <= np.abs(batch.x - x) + 0.1).all()
 
@@ -72,8 +75,8 @@ def test_a_goal_comes_nearer_by_what_the_robot_moved(batch, config, counted):
     turn(state, batch, config, 0)
     ring = jax.tree.map(lambda rows: rows[: config.steps * config.robots], state.replay)
     ring = jax.tree.map(lambda rows: rows.reshape(config.steps, config.robots, *rows.shape[1:]), ring)
-    nearer = np.where(ring.slot == GOAL, ring.displacement, 0.0)
-    np.testing.assert_allclose(ring.value[1:], (ring.value - nearer)[:-1], atol=1e-5)
+    nearer = np.where(ring.command.slot == GOAL, ring.motion.displacement, 0.0)
+    np.testing.assert_allclose(ring.command.value[1:], (ring.command.value - nearer)[:-1], atol=1e-5)
 
 
 def test_what_has_fallen_starts_anew_with_a_new_order(batch, config):
@@ -81,7 +84,7 @@ def test_what_has_fallen_starts_anew_with_a_new_order(batch, config):
     turn(state, batch, config, 0)
     batch.lying_s[:] = (0.0, 5.0, 0.0)
     before, left = batch.qpos.copy(), state.orders.steps_left.copy()
-    train.reset_the_fallen(state, batch, np.random.default_rng(0))
+    train.begin_anew(state, batch, batch.fallen, np.random.default_rng(0))
     np.testing.assert_array_equal((batch.qpos != before).any(axis=1), [False, True, False])
     assert batch.x[1] == 0
     np.testing.assert_array_equal(state.previous_qpos[1], batch.qpos[1])
@@ -97,10 +100,15 @@ def relabelled(config):
         joints=rng.normal(size=(size, 17)).astype(np.float32),
         action=rng.uniform(-1, 1, (size, 6)).astype(np.float32),
         next_joints=rng.normal(size=(size, 17)).astype(np.float32),
-        displacement=rng.normal(0, 0.1, size).astype(np.float32),
-        pitch=rng.uniform(-3, 3, size).astype(np.float32),
-        slot=rng.integers(GOAL, VELOCITY + 1, size).astype(np.int32),
-        value=rng.uniform(-3, 3, size).astype(np.float32),
+        motion=Motion(
+            displacement=rng.normal(0, 0.1, size).astype(np.float32),
+            turn=rng.normal(0, 0.1, size).astype(np.float32),
+            pitch=rng.uniform(-3, 3, size).astype(np.float32),
+            fell=rng.random(size) < 0.1,
+        ),
+        command=Command(
+            rng.integers(GOAL, VELOCITY + 1, size).astype(np.int32), rng.uniform(-3, 3, size).astype(np.float32)
+        ),
     )
     return transitions, relabel(transitions, jax.random.key(2), config, CONTROL_DT)
 
@@ -109,16 +117,16 @@ def told(observation, config):
     """(whether it is a goal, value) of the command in each observation."""
     is_goal, is_speed, ahead, _, _, speed = np.asarray(observation)[:, 17:].T
     np.testing.assert_array_equal(is_goal + is_speed, 1)
-    return is_goal == 1, np.where(is_goal, ahead * config.commands.max_distance, speed)
+    return is_goal == 1, np.where(is_goal, ahead * MARGIN * config.reach.distance, speed)
 
 
 def test_half_of_a_batch_learns_under_its_own_command(relabelled, config):
     transitions, batch = relabelled
     is_goal, value = told(batch.observation, config)
     half = len(value) // 2
-    np.testing.assert_array_equal(is_goal[half:], transitions.slot[half:] == GOAL)
-    np.testing.assert_allclose(value[half:], transitions.value[half:], rtol=1e-5)
-    assert np.mean(np.abs(value[:half] - transitions.value[:half]) > 1e-4) > 0.95
+    np.testing.assert_array_equal(is_goal[half:], transitions.command.slot[half:] == GOAL)
+    np.testing.assert_allclose(value[half:], transitions.command.value[half:], rtol=1e-5)
+    assert np.mean(np.abs(value[:half] - transitions.command.value[:half]) > 1e-4) > 0.95
     assert np.mean(is_goal[:half]) == pytest.approx(0.5, abs=0.1)
     assert np.mean(value[:half] == 0) == pytest.approx(config.commands.zero_share, abs=0.06)
 
@@ -128,16 +136,16 @@ def test_everything_but_the_command_is_as_it_was(relabelled):
     np.testing.assert_array_equal(batch.observation[:, :17], transitions.joints)
     np.testing.assert_array_equal(batch.next_observation[:, :17], transitions.next_joints)
     np.testing.assert_array_equal(batch.action, transitions.action)
-    assert not np.asarray(batch.terminal).any()
+    np.testing.assert_array_equal(batch.terminal, transitions.motion.fell)
 
 
 def test_the_reward_is_what_the_command_would_have_brought(relabelled, config):
     transitions, batch = relabelled
     is_goal, value = told(batch.observation, config)
-    miss = np.abs(value - transitions.displacement)
+    miss = np.abs(value - transitions.motion.displacement)
     goal = 0.5 * 0.1 / (0.1 + miss) - 0.2 * miss
-    velocity = -0.4 * np.abs(value - transitions.displacement / CONTROL_DT)
-    posture = -0.5 * (1 - np.cos(transitions.pitch)) - 0.02 * np.mean(transitions.action**2, axis=1)
+    velocity = -0.4 * np.abs(value - transitions.motion.displacement / CONTROL_DT)
+    posture = -0.5 * (1 - np.cos(transitions.motion.pitch)) - 0.02 * np.mean(transitions.action**2, axis=1)
     np.testing.assert_allclose(batch.reward, np.where(is_goal, goal, velocity) + posture, rtol=1e-4, atol=1e-5)
 
 
@@ -146,8 +154,8 @@ def test_afterwards_a_goal_is_nearer_and_a_speed_the_same(relabelled, config):
     is_goal, value = told(batch.observation, config)
     later_is_goal, later = told(batch.next_observation, config)
     np.testing.assert_array_equal(later_is_goal, is_goal)
-    expected = value - np.where(is_goal, transitions.displacement, 0.0)
-    within = np.abs(expected) < config.commands.max_distance
+    expected = value - np.where(is_goal, transitions.motion.displacement, 0.0)
+    within = np.abs(expected) < MARGIN * config.reach.distance
     np.testing.assert_allclose(later[within], expected[within], atol=1e-5)
 
 
@@ -155,5 +163,76 @@ def test_relabelling_can_be_turned_off(relabelled, config):
     transitions, _ = relabelled
     batch = relabel(transitions, jax.random.key(2), replace(config, relabelled=0.0), CONTROL_DT)
     is_goal, value = told(batch.observation, config)
-    np.testing.assert_array_equal(is_goal, transitions.slot == GOAL)
-    np.testing.assert_allclose(value, transitions.value, rtol=1e-5)
+    np.testing.assert_array_equal(is_goal, transitions.command.slot == GOAL)
+    np.testing.assert_allclose(value, transitions.command.value, rtol=1e-5)
+
+
+def test_a_fall_ends_what_is_learned_and_nothing_else_does(batch, config, counted):
+    """Robot 1 has lain on its back for almost long enough."""
+    state = initial_state(config, batch, jax.random.key(0))
+    batch.qpos[1, batch.spec.root_addresses[2]] = np.pi
+    batch.lying_s[1] = 0.98
+    turn(state, batch, config, 0)
+    rows = config.steps * config.robots
+    seen = jax.tree.map(lambda leaf: leaf[:rows], state.replay)
+    assert np.flatnonzero(seen.motion.fell).tolist() == [1]
+    assert np.abs(seen.next_joints[1, 1]) > 2.5  # its pitch: what is learned is how it lay
+    assert np.abs(seen.joints[1 + config.robots, 1]) < 0.2  # and then it stood again
+    learned = relabel(seen, jax.random.key(0), config, CONTROL_DT)
+    assert np.flatnonzero(learned.terminal).tolist() == [1]
+
+
+def test_pushes_come_as_often_and_are_as_large_as_the_settings_say(batch, config):
+    config, rng, pushed = replace(config, push=0.4, push_every_s=0.5), np.random.default_rng(0), []
+    for _ in range(3000):
+        batch.qvel[:] = 0.0
+        train.push(batch, config, rng)
+        assert not batch.qvel[:, 1:].any()
+        pushed.extend(batch.qvel[:, 0])
+    change = np.array(pushed)[np.flatnonzero(pushed)]
+    assert len(change) / len(pushed) == pytest.approx(CONTROL_DT / 0.5, rel=0.13)  # four standard deviations
+    np.testing.assert_allclose(np.sort(change), np.linspace(-0.4, 0.4, len(change)), atol=0.06)
+    assert np.abs(change).max() <= 0.4
+
+
+def test_a_push_is_seen_before_the_robot_acts(batch, config, counted):
+    """It is no work of the action's: the speed changes between two steps, not within one."""
+    state = initial_state(config, batch, jax.random.key(0))
+    turn(state, batch, replace(config, push=0.4, push_every_s=CONTROL_DT), 0)
+    ring, speed = state.replay, 8  # after z, pitch and six joints
+    change = ring.joints[3:12] - ring.next_joints[:9]
+    assert (np.abs(change[:, speed]) > 1e-4).all()
+    assert np.abs(change[:, speed]).max() < 0.4 + 1e-5
+    np.testing.assert_array_equal(np.delete(change, speed, axis=1), 0)
+
+
+def test_under_a_new_command_a_wanted_pitch_stays_in_the_world(relabelled, config):
+    transitions, _ = relabelled
+    standing = replace(config, relabelled=1.0, reach=replace(config.reach, pitch=(-0.5, 1.0)))
+    batch = relabel(transitions, jax.random.key(2), standing, CONTROL_DT)
+    stands, turn, later = (np.asarray(o) for o in (batch.observation[:, 19] == 1, *pitches(batch)))
+    assert np.mean(stands) == pytest.approx(1 / 3, abs=0.1)
+    assert not turn[~stands].any()
+    motion = transitions.motion
+    wanted = (motion.pitch - motion.turn + turn)[stands]
+    np.testing.assert_allclose((motion.pitch + later)[stands], wanted, atol=1e-5)
+    assert MARGIN * -0.5 - 1e-5 <= wanted.min() < -0.4
+    assert 0.9 < wanted.max() <= MARGIN * 1.0 + 1e-5
+    miss = np.abs(later[stands])
+    energy = 0.02 * np.mean(transitions.action[stands] ** 2, axis=1)
+    np.testing.assert_allclose(batch.reward[stands], 0.05 / (0.1 + miss) - 0.5 * miss - energy, rtol=1e-4, atol=1e-5)
+
+
+def pitches(batch):
+    """What each robot is to turn, before and after the step [rad]."""
+    return batch.observation[:, 24], batch.next_observation[:, 24]
+
+
+def test_its_own_command_to_stand_is_kept(relabelled, config):
+    transitions, _ = relabelled
+    told = replace(transitions.command, slot=np.full(400, STAND, np.int32))
+    standing = replace(config, relabelled=0.0, reach=replace(config.reach, pitch=(-0.5, 1.0)))
+    batch = relabel(replace(transitions, command=told), jax.random.key(2), standing, CONTROL_DT)
+    turn, later = pitches(batch)
+    np.testing.assert_array_equal(turn, told.value)
+    np.testing.assert_allclose(later, told.value - transitions.motion.turn, atol=1e-6)

@@ -23,7 +23,7 @@ from rebody.report.thesis.panels import (
 )
 from rebody.training.flat import FlatConfig, train_flat
 from rebody.training.inference import PRESETS, train_inference
-from rebody.training.tracker import TrackerConfig, train_tracker
+from rebody.training.tracker import tracker_preset, train_tracker
 
 THESIS_GOALS = np.linspace(0.5, 10.0, 12)
 GOALS = np.linspace(-10.0, 10.0, 12)
@@ -138,7 +138,7 @@ def tracker_training_log() -> Data:
 def train_tracker_again(runs: Path) -> Data:
     """Of a tracker trained anew."""
     out = runs / "tracker-cheetah"
-    train_tracker("cheetah", TrackerConfig(), out, 0, resume=True)
+    train_tracker("cheetah", tracker_preset(load_robot("cheetah")), out, 0, resume=True)
     return training_log(out, "tracker")
 
 

@@ -19,15 +19,16 @@ from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
 from rebody.control.flat import FlatPolicy, flat_observation
 from rebody.control.sac import Actor, SACBatch, SACState
-from rebody.control.tracker import Command, tracker_reward
+from rebody.control.tracker import relative, slots_of, tracker_reward
 from rebody.errors import RebodyError
 from rebody.inference import Encoder, EncoderCarry
-from rebody.tasks import GOAL, BaseTask, RewardForm, TaskDistribution, reward
+from rebody.tasks import BaseTask, RewardForm, TaskDistribution, reward
 from rebody.training.flat.config import FlatConfig
 from rebody.training.flat.report import measure, save_flat
+from rebody.training.motion import motion_of
 from rebody.training.ring import draw, write
 from rebody.training.run import Metrics, Run
-from rebody.types import AnyArray, Belief, GlobalState, Task, Transition
+from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task, Transition
 
 EVALUATE_EVERY = 50
 
@@ -79,7 +80,7 @@ def train_flat(
     spec, module = load_robot(robot), load_inference(inference)
     if config.steps < spec.steps_per_decision:
         raise RebodyError(f"--steps must be at least the {spec.steps_per_decision} control steps of a decision.")
-    check_fit("flat", module, spec.name, spec.moving_fields)
+    check_fit("flat", module, spec.name, spec.moving_fields, slots_of(spec.reach))
     settings = {"robot": robot, "inference": inference, "seed": seed, "init_from": init_from}
     run = Run(out, asdict(config) | settings, resume=resume)
     batch = RobotBatch(spec, config.robots)
@@ -133,7 +134,7 @@ def collect(
             batch.reset(rng)
             minds = new_minds(batch, module, task_key)
             state.previous_qpos[:] = batch.qpos
-        observation, x = observe(batch, minds.belief, module), batch.x
+        observation, before = observe(batch, minds.belief, module), batch.qpos.copy()
         action = np.asarray(_explore(state.sac.actor, observation, action_key))
         batch.step(action)
         if (step + 1) % spec.steps_per_decision == 0:
@@ -144,7 +145,7 @@ def collect(
         seen = Replay(
             observation=observation,
             action=action,
-            reward=_pay(batch, x, minds.task, action, config),
+            reward=_pay(batch, before, minds.task, action, config),
             next_observation=observe(batch, minds.belief, module),
         )
         write(state.replay, step * config.robots, seen)
@@ -233,14 +234,18 @@ def flat_policy(state: RunState, module: Inference) -> FlatPolicy:
 
 
 def _pay(
-    batch: RobotBatch, x: Float[np.ndarray, " robot"], task: Task, action: Float[np.ndarray, "robot action"], config
+    batch: RobotBatch,
+    before: Float[np.ndarray, "robot nq"],
+    task: Task,
+    action: Float[np.ndarray, "robot action"],
+    config,
 ) -> Float[np.ndarray, " robot"]:
     """What a tracker would be paid that was told the hidden task."""
-    family, target = np.asarray(task.family), np.asarray(task.target)
-    command = Command(family, (target - np.where(family == GOAL, x, 0.0)).astype(np.float32))
-    moved, spec = (batch.x - x).astype(np.float32), batch.spec
-    pitch = spec.pitch(batch.qpos).astype(np.float32)
-    return np.asarray(tracker_reward(command, moved, spec.control_dt, pitch, action, config.reward))
+    spec = batch.spec
+    x, _, pitch = before[:, spec.root_addresses].astype(np.float32).T
+    command = relative(Subgoal(np.asarray(task.family), np.asarray(task.target)), x, pitch)
+    motion = motion_of(batch, before)
+    return np.asarray(tracker_reward(command, motion, spec.control_dt, action, spec.reach, config.reward))
 
 
 @eqx.filter_jit

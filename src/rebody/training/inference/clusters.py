@@ -62,7 +62,9 @@ def sample_beliefs(
 
 def draw(belief: Belief, config: MetaConfig, rng: np.random.Generator) -> Float[np.ndarray, "point clustered"]:
     """A latent of each belief, in the dimensions that the mixture clusters."""
-    mean, variance = (np.asarray(part[:, : config.clustered], float) for part in (belief.mean, belief.variance))
+    mean, variance = (
+        np.asarray(part[:, : config.inference.clustered], float) for part in (belief.mean, belief.variance)
+    )
     return mean + np.sqrt(variance) * rng.standard_normal(mean.shape)
 
 

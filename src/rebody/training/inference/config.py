@@ -54,8 +54,10 @@ class MetaConfig:
     toy: Literal["mass-damper", "position", "full"] = "mass-damper"
     """The body that everything is learned on."""
     arrival: float = 0.0
-    """Added to the scaled reward r / reward_scale of the policy's learning when r = 0, half of it at r = -0.1. It
-    is a function of the reward alone, and pulls the last centimetres."""
+    """Added to the scaled reward r / reward_scale of the policy's learning when r = 0. It is a function of the reward
+    alone, and pulls the last centimetres."""
+    arrival_width: float = 0.1
+    """Half of it is added at r = -arrival_width."""
     randomisation: Randomisation = field(default_factory=Randomisation)
     """Disturbances of half of the episodes."""
     switch_share: float = 0.0
@@ -89,11 +91,6 @@ class MetaConfig:
         """Smallest and largest target of each family, in the order of their indices."""
         names = [FAMILIES[index].name for index in self.tasks.families]
         return {name: self.tasks.target_range(name) for name in names}
-
-    @property
-    def clustered(self) -> int:
-        """Dimensions of the latent that the mixture clusters: those that say what kind of task it is."""
-        return self.inference.kinds or self.inference.latent
 
     @property
     def inference_iterations(self) -> int:

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, PRNGKeyArray
 from rebody.bodies.toys import Toy, ToyState, no_disturbance
 from rebody.control.high_level import policy_observation
 from rebody.control.sac import Actor
-from rebody.inference import Encoder
+from rebody.inference import Encoder, InferenceModule
 from rebody.tasks import reward
 from rebody.training.inference.config import MetaConfig
 from rebody.types import AnyArray, Belief, GlobalState, Task, Transition
@@ -43,7 +43,7 @@ class Episodes(eqx.Module):
 
 @eqx.filter_jit
 def collect(
-    encoder: Encoder,
+    module: InferenceModule,
     actor: Actor,
     toy: Toy,
     config: MetaConfig,
@@ -59,6 +59,7 @@ def collect(
     task = config.tasks.sample_episodes(task_key, config.episodes, config.decisions, config.switch_share)
     body = _random_start(toy, config, start_key)
     seen = _observe(toy, body, config, observe_key)
+    encoder, interpret = module.encoder, module.decoder.interpret
     belief = encoder.prior(shape)
     held = jax.random.uniform(held_key, (*shape, toy.actions), minval=-1.0)
 
@@ -66,7 +67,7 @@ def collect(
         task, key = inputs
         body, seen, carry, belief, held = walk
         action_key, step_key, noise_key, wander_key = jax.random.split(key, 4)
-        observation = policy_observation(seen, belief, config.policy_fields, config.policy_scales)
+        observation = policy_observation(seen, interpret(belief), config.policy_fields, config.policy_scales)
         sampled, _ = actor.sample(observation, action_key)
         held = _wander(held, config.turn_probability, wander_key)
         action = jnp.where(roles.decides[:, None], actor(observation), sampled)

@@ -12,10 +12,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Array, Float, Int, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import InferenceParts, load_inference, task_code
-from rebody.bodies.toys import Toy, make_toy
+from rebody.bodies.toys import MIRRORED, Toy, make_toy
 from rebody.control import sac
 from rebody.control.high_level import HighLevelPolicy, policy_observation
 from rebody.control.sac import SACBatch, SACState
@@ -80,7 +80,7 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
     clusters = state.clusters
 
     acting = roles(config.episodes, all_wander=iteration < config.wander_iterations)
-    episodes = collect(module.encoder, policy.actor, toy, config, acting, keys[0])
+    episodes = collect(module, policy.actor, toy, config, acting, keys[0])
     metrics = {"return": episodes.reward[acting.decides].sum(-1).mean()}
     replay, stored = store(state.replay, episodes, state.iteration)
     if iteration < config.inference_iterations:
@@ -98,7 +98,8 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
             # it acts in no episode itself: later ones, of a policy that hardly explores, would lead it astray
             told, told_metrics = update_policy(told, tell(replay, config), stored, config, keys[2])
             metrics |= {f"told/{name}": value for name, value in told_metrics.items()}
-        policy, policy_metrics = update_policy(policy, replay, stored, config, keys[2])
+        interpreted = eqx.tree_at(lambda e: e.belief, replay, module.decoder.interpret(replay.belief))
+        policy, policy_metrics = update_policy(policy, interpreted, stored, config, keys[2])
         metrics |= policy_metrics
     state = RunState(module, optimiser, policy, told, clusters, replay, state.iteration + 1)
     if (iteration + 1) % EVALUATE_EVERY == 0:
@@ -119,9 +120,9 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     module_key, sac_key = jax.random.split(key)
     module = InferenceModule(config.inference, toy.actions, module_key)
     observations, families = len(config.policy_fields), len(config.tasks.families)
-    policy = sac.initial_state(observations + 2 * config.inference.latent, toy.actions, config.sac, sac_key)
+    policy = sac.initial_state(observations + 2 * config.inference.interpreted, toy.actions, config.sac, sac_key)
     told = sac.initial_state(observations + 2 * 2 * families, toy.actions, config.sac, sac_key)
-    clusters = no_clusters(config.mixture.maximum, config.clustered)
+    clusters = no_clusters(config.mixture.maximum, config.inference.clustered)
     if init_from is not None:
         parts = load_inference(init_from).parts
         module = _take_over(parts.module, module, init_from)
@@ -129,9 +130,7 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
         told = sac.take_over(told, parts.told_policy.actor, init_from)
         if parts.mixture is not None and parts.mixture.mean.shape == clusters.prior.mean.shape:
             clusters = clusters_of(parts.mixture)
-    one_group = jax.eval_shape(
-        lambda: collect(module.encoder, policy.actor, toy, config, roles(config.episodes, True), key)
-    )
+    one_group = jax.eval_shape(lambda: collect(module, policy.actor, toy, config, roles(config.episodes, True), key))
     return RunState(
         module=module,
         optimiser=_optimiser(config).init(eqx.filter(module, eqx.is_array)),
@@ -202,7 +201,7 @@ def update_inference(
 def update_policy(
     policy: SACState, replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
-    """Steps of soft actor-critic on nominal episodes, with the beliefs held then."""
+    """Steps of soft actor-critic on nominal episodes, with the beliefs held then as the policy sees them."""
 
     def batch_of(_: None, key: PRNGKeyArray) -> SACBatch:
         return sample_transitions(replay, stored, config, key)
@@ -244,7 +243,7 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
 
 def sample_transitions(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray) -> SACBatch:
     """Decisions of nominal episodes, with the beliefs before and after."""
-    group_key, episode_key, time_key = jax.random.split(key, 3)
+    group_key, episode_key, time_key, mirror_key = jax.random.split(key, 4)
     size = (config.sac.batch_size,)
     group = jax.random.randint(group_key, size, 0, stored)
     episode = jax.random.randint(episode_key, size, 0, config.episodes // 2)
@@ -254,17 +253,33 @@ def sample_transitions(replay: Episodes, stored, config: MetaConfig, key: PRNGKe
         state, belief = jax.tree.map(lambda leaf: leaf[group, episode, time], (replay.state, replay.belief))
         return policy_observation(state, belief, config.policy_fields, config.policy_scales)
 
-    return SACBatch(
+    batch = SACBatch(
         observation=observation(time),
         action=replay.action[group, episode, time],
         reward=_shaped(replay.reward[group, episode, time], config),
         next_observation=observation(time + 1),
         terminal=jnp.zeros(size),
     )
+    return mirror(batch, jax.random.bernoulli(mirror_key, shape=size), config) if config.inference.kinds else batch
+
+
+def mirror(batch: SACBatch, chosen: Bool[AnyArray, " batch"], config: MetaConfig) -> SACBatch:
+    """The chosen transitions as they would be with front and back exchanged, which the toy does not tell apart.
+
+    Beliefs must be interpreted, so that it is plain which of their numbers change sign: places do, shares do not.
+    """
+    fields, places = len(config.policy_fields), (batch.observation.shape[-1] - len(config.policy_fields)) // 4
+    signs = jnp.concatenate([-jnp.ones(fields), jnp.ones(places), -jnp.ones(places), jnp.ones(2 * places)])
+    seen, done = (jnp.where(chosen[:, None], turned, 1.0) for turned in (signs, jnp.asarray(MIRRORED[config.toy])))
+    return SACBatch(
+        batch.observation * seen, batch.action * done, batch.reward, batch.next_observation * seen, batch.terminal
+    )
 
 
 def _shaped(reward: Float[Array, " batch"], config: MetaConfig) -> Float[Array, " batch"]:
-    return reward / config.inference.reward_scale + config.arrival * 0.1 / (0.1 - reward)
+    return reward / config.inference.reward_scale + config.arrival * config.arrival_width / (
+        config.arrival_width - reward
+    )
 
 
 def _optimiser(config: MetaConfig) -> optax.GradientTransformation:

@@ -7,9 +7,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float, Int, PRNGKeyArray
 
+from rebody.bodies.robot import Reach
 from rebody.bodies.toys import MassDamper, ToyState
-from rebody.control.tracker import Command
-from rebody.tasks import GOAL, VELOCITY
+from rebody.control.tracker import MARGIN, Command, slots_of
+from rebody.tasks import GOAL, STAND
 from rebody.types import AnyArray, GlobalState, Subgoal, Task
 
 
@@ -17,26 +18,32 @@ from rebody.types import AnyArray, GlobalState, Subgoal, Task
 class CommandDistribution:
     """How commands are drawn."""
 
-    max_distance: float = 5.0
-    """Farthest goal [m]; farther ones are cut to it when the tracker is used."""
-    max_speed: float = 3.3
-    """Fastest speed [m/s], a little beyond what is asked later."""
     near_share: float = 0.35
     """Share of goals drawn log-uniformly between 0.01 and 1 m."""
     zero_share: float = 0.1
     """Share of commands that ask to stand still."""
 
-    def sample(self, key: PRNGKeyArray, shape: tuple[int, ...]) -> Command:
-        """Commands of the given batch shape."""
-        keys = jax.random.split(key, 6)
-        far = jax.random.uniform(keys[0], shape, minval=-self.max_distance, maxval=self.max_distance)
+    def sample(self, key: PRNGKeyArray, pitch: Float[AnyArray, "*batch"], reach: Reach) -> Command:
+        """A command for each robot, which is at that pitch [rad]; a little beyond what will be asked."""
+        keys, shape = jax.random.split(key, 6), pitch.shape
+        unit = jax.random.uniform(keys[0], shape, minval=-1.0)
+        far = MARGIN * reach.distance * unit
         sign = jnp.where(jax.random.bernoulli(keys[1], shape=shape), 1.0, -1.0)
         near = sign * 10.0 ** jax.random.uniform(keys[2], shape, minval=-2.0, maxval=0.0)
         goal = jnp.where(jax.random.bernoulli(keys[3], self.near_share, shape), near, far)
-        speed = far * (self.max_speed / self.max_distance)
-        slot = jax.random.randint(keys[4], shape, GOAL, VELOCITY + 1)
+        speed = _between(MARGIN * reach.speed[0], MARGIN * reach.speed[1], unit)
+        slot = jax.random.randint(keys[4], shape, GOAL, len(slots_of(reach)))
+        asked = jnp.where(slot == GOAL, goal, speed)
+        if reach.pitch is not None:
+            asked = jnp.where(slot == STAND, _between(MARGIN * reach.pitch[0], MARGIN * reach.pitch[1], unit), asked)
         still = jax.random.bernoulli(keys[5], self.zero_share, shape)
-        return Command(slot, jnp.where(still, 0.0, jnp.where(slot == GOAL, goal, speed)))
+        here = jnp.where(slot == STAND, pitch, 0.0)
+        return Command(slot, jnp.where(still, 0.0, asked) - here)
+
+
+def _between(low: float, high: float, unit: Float[AnyArray, "*batch"]) -> Float[AnyArray, "*batch"]:
+    """-1 becomes `low`, 1 `high`."""
+    return 0.5 * (low + high) + 0.5 * (high - low) * unit
 
 
 class ToyGuide(eqx.Module):

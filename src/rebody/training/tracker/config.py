@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from rebody.bodies.robot import Reach
 from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
 from rebody.training.tracker.commands import CommandDistribution
@@ -11,6 +12,8 @@ from rebody.training.tracker.commands import CommandDistribution
 class TrackerConfig:
     """One training run of a tracker."""
 
+    reach: Reach
+    """What is asked of the robot, but for a margin."""
     robots: int = 64
     """Copies that move in parallel."""
     steps: int = 32
@@ -25,10 +28,17 @@ class TrackerConfig:
     """Share of a batch whose commands are drawn anew."""
     segment_s: tuple[float, float] = (1.0, 8.0)
     """Shortest and longest time between changes of the command (thesis 6.3.3) [s]."""
+    curriculum_iterations: int = 0
+    """The thesis' curriculum (6.4.1) in place of `segment_s`: for so many iterations an order lasts for a trajectory of
+    300 control steps; then trajectories of 1000, a new order every 125, and often once one is reached. 0 for none."""
     guided_share: float = 0.25
     """Share of commands that come from a toy ahead of the robot, renewed at every decision."""
     max_horizon: int = 15
     """Farthest look ahead of that toy [decisions]."""
+    push_every_s: float = 4.0
+    """Mean time between pushes [s]."""
+    push: float = 0.3
+    """Largest change of a robot's speed by a push, either way [m/s]."""
     commands: CommandDistribution = field(default_factory=CommandDistribution)
     """How commands are drawn."""
     reward: TrackerReward = field(default_factory=TrackerReward)

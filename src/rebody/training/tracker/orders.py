@@ -9,9 +9,10 @@ from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
 from rebody.bodies import RobotBatch
 from rebody.control.tracker import Command
-from rebody.tasks import GOAL
+from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.training.tracker.commands import ToyGuide
 from rebody.training.tracker.config import TrackerConfig
+from rebody.training.tracker.schedule import REACHED, Schedule
 from rebody.types import AnyArray, GlobalState, Task
 
 
@@ -19,8 +20,9 @@ class Orders(eqx.Module):
     """One standing order per robot; arrays are written in place."""
 
     slot: Int[np.ndarray, " robot"]
-    value: Float[np.ndarray, " robot"]  # m in the world, or m/s
+    value: Float[np.ndarray, " robot"]  # m in the world, m/s, or rad
     steps_left: Int[np.ndarray, " robot"]  # control steps
+    age: Int[np.ndarray, " robot"]  # control steps since the robot began anew
     guided: Bool[np.ndarray, " robot"]  # whether a toy ahead of the robot renews the value
     guide_target: Float[np.ndarray, " robot"]  # where that toy is going
     guide_horizon: Int[np.ndarray, " robot"]  # how far it is ahead [decisions]
@@ -32,33 +34,52 @@ def no_orders(robots: int) -> Orders:
         slot=np.zeros(robots, np.int32),
         value=np.zeros(robots, np.float32),
         steps_left=np.zeros(robots, np.int32),
+        age=np.zeros(robots, np.int32),
         guided=np.zeros(robots, bool),
         guide_target=np.zeros(robots, np.float32),
         guide_horizon=np.ones(robots, np.int32),
     )
 
 
-def renew(orders: Orders, batch: RobotBatch, config: TrackerConfig, rng: np.random.Generator, key: PRNGKeyArray):
+def renew(
+    orders: Orders,
+    batch: RobotBatch,
+    config: TrackerConfig,
+    lasting: Schedule,
+    rng: np.random.Generator,
+    key: PRNGKeyArray,
+):
     """Count one control step, and give a new order where the old one has run out."""
     orders.steps_left[:] -= 1
+    orders.age[:] += 1
     due = orders.steps_left < 0
+    if lasting.change_when_reached:
+        due |= _is_reached(orders, batch) & (rng.random(config.robots) < lasting.change_when_reached)
     if not due.any():
         return
     spec = batch.spec
-    drawn = jax.tree.map(np.asarray, _draw(key, config))
-    here = np.where(drawn.slot == GOAL, batch.x, 0.0)
-    shortest, longest = (round(seconds / spec.control_dt) for seconds in config.segment_s)
+    pitch = spec.pitch(batch.qpos).astype(np.float32)
+    drawn = jax.tree.map(np.asarray, _draw(key, pitch, config))
+    here = _here(drawn.slot, batch.x, pitch)
+    shortest, longest = lasting.segment
     new = Orders(
         slot=drawn.slot,
         value=(here + drawn.value).astype(np.float32),
         steps_left=rng.integers(shortest, longest + 1, config.robots).astype(np.int32),
-        guided=rng.random(config.robots) < config.guided_share,
+        age=orders.age.copy(),
+        guided=(rng.random(config.robots) < config.guided_share) & (drawn.slot != STAND),
         # a toy's own goals lie farther off than what a tracker is shown
         guide_target=(here + np.where(drawn.slot == GOAL, 2.0, 1.0) * drawn.value).astype(np.float32),
         guide_horizon=rng.integers(1, config.max_horizon + 1, config.robots).astype(np.int32),
     )
     for old, fresh in zip(jax.tree.leaves(orders), jax.tree.leaves(new), strict=True):
         old[due] = fresh[due]
+
+
+def _is_reached(orders: Orders, batch: RobotBatch) -> Bool[np.ndarray, " robot"]:
+    velocity = batch.qvel[:, batch.spec.x_velocity_address]
+    left = commands(orders, batch).value - np.where(orders.slot == VELOCITY, velocity, 0.0)
+    return np.abs(left) < REACHED
 
 
 def follow_guides(orders: Orders, state: GlobalState, config: TrackerConfig) -> None:
@@ -68,15 +89,20 @@ def follow_guides(orders: Orders, state: GlobalState, config: TrackerConfig) -> 
     orders.value[:] = np.where(orders.guided, ahead, orders.value)
 
 
-def commands(orders: Orders, x: Float[np.ndarray, " robot"]) -> Command:
+def commands(orders: Orders, batch: RobotBatch) -> Command:
     """Orders as the robots see them: a goal in the world becomes a distance."""
-    value = orders.value - np.where(orders.slot == GOAL, x, 0.0)
+    value = orders.value - _here(orders.slot, batch.x, batch.spec.pitch(batch.qpos))
     return Command(orders.slot.copy(), value.astype(np.float32))
 
 
+def _here(slot: Int[np.ndarray, " robot"], x: Float[np.ndarray, " robot"], pitch: Float[np.ndarray, " robot"]):
+    """What each order is relative to."""
+    return np.where(slot == GOAL, x, np.where(slot == STAND, pitch, 0.0))
+
+
 @partial(jax.jit, static_argnames="config")
-def _draw(key: PRNGKeyArray, config: TrackerConfig) -> Command:
-    return config.commands.sample(key, (config.robots,))
+def _draw(key: PRNGKeyArray, pitch: Float[AnyArray, " robot"], config: TrackerConfig) -> Command:
+    return config.commands.sample(key, pitch, config.reach)
 
 
 @partial(jax.jit, static_argnames="max_horizon")

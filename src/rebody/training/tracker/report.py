@@ -5,14 +5,15 @@ from pathlib import Path
 
 import jax
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, RobotSpec
-from rebody.control.tracker import SLOTS, Tracker
+from rebody.bodies.robot import Reach
+from rebody.control.tracker import Tracker
 from rebody.store import save_artifact
-from rebody.tasks import GOAL, VELOCITY
+from rebody.tasks import FAMILIES, GOAL, VELOCITY
 from rebody.tasks.figures import final_error
 from rebody.training.card import card
 from rebody.training.run import Run
@@ -22,30 +23,41 @@ from rebody.types import DECISION_DT, GlobalState, Subgoal, Task
 COMMANDS = 100
 """Held-out commands per slot."""
 SECONDS = 10.0
-GOALS = (-5.0, 5.0)
-SPEEDS = (1.0, 3.0)
+SLOWEST = 0.3
+"""Speeds below this are not asked for [m/s]."""
 
 
 def measure(tracker: Tracker, spec: RobotSpec) -> dict[str, float]:
-    """Errors on goals to +-5 m and speeds of +-[1, 3] m/s, speed at a zero command, share that fell."""
-    rng = np.random.default_rng(2**31 - 1)
-    goals = rng.uniform(*GOALS, COMMANDS)
-    speeds = rng.uniform(*SPEEDS, COMMANDS) * rng.choice([-1, 1], COMMANDS)
+    """Errors on held-out commands of each slot within reach, speed at a zero command, share that fell."""
+    rng, reach = np.random.default_rng(2**31 - 1), tracker.reach
+    values = [rng.uniform(-reach.distance, reach.distance, COMMANDS), speeds_within(reach, COMMANDS, rng)]
+    if reach.pitch is not None:
+        values.append(rng.uniform(*reach.pitch, COMMANDS))
+    slot = np.repeat(np.arange(len(values)), COMMANDS)
     zeros = np.zeros(COMMANDS // 4)
-    slot = np.repeat([GOAL, VELOCITY, GOAL, VELOCITY], [COMMANDS, COMMANDS, len(zeros), len(zeros)])
-    value = np.concatenate([goals, speeds, zeros, zeros])
-    command = Subgoal(slot.astype(np.int32), value.astype(np.float32))
+    command = Subgoal(
+        np.concatenate([slot, np.full(len(zeros), GOAL), np.full(len(zeros), VELOCITY)]).astype(np.int32),
+        np.concatenate([*values, zeros, zeros]).astype(np.float32),
+    )
     states, fell = _run(tracker, spec, command)
-    errors = final_error(Task(command.slot, command.value), states)[: 2 * COMMANDS].reshape(2, COMMANDS)
-    last_second = states.vx[-10:, 2 * COMMANDS :]
-    return {
-        "goal median": float(np.median(errors[0])),
-        "goal p95": float(np.percentile(errors[0], 95)),
-        "velocity median": float(np.median(errors[1])),
-        "velocity p95": float(np.percentile(errors[1], 95)),
-        "zero speed": float(np.abs(last_second).mean()),
-        "fell": float(fell.mean()),
-    }
+    errors = final_error(Task(command.slot, command.value), states)
+    figures = {}
+    for index, name in enumerate(tracker.slots):
+        of_slot = errors[: len(slot)][slot == index]
+        figures[f"{name} median"] = float(np.median(of_slot))
+        figures[f"{name} p95"] = float(np.percentile(of_slot, 95))
+    figures["zero speed"] = float(np.abs(states.vx[-10:, len(slot) :]).mean())  # in the last second
+    return figures | {"fell": float(fell.mean())}
+
+
+def speeds_within(reach: Reach, size: int, rng: np.random.Generator) -> Float[np.ndarray, " size"]:
+    """Speeds that may be asked for, none of them close to zero [m/s]."""
+    slowest, fastest = reach.speed
+    ranges = [ends for ends in ((slowest, -SLOWEST), (SLOWEST, fastest)) if ends[0] < ends[1]]
+    lengths = np.array([high - low for low, high in ranges])
+    which = rng.choice(len(ranges), size, p=lengths / lengths.sum())
+    low, high = np.array(ranges)[which].T
+    return rng.uniform(low, high)
 
 
 def _run(tracker: Tracker, spec: RobotSpec, command: Subgoal) -> tuple[GlobalState, Bool[np.ndarray, " robot"]]:
@@ -65,13 +77,11 @@ def _run(tracker: Tracker, spec: RobotSpec, command: Subgoal) -> tuple[GlobalSta
 def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: Run, seed: int) -> Path:
     """Measure, write artifact and card."""
     figures = measure(tracker, spec)
-    actor = tracker.actor
+    actor, reach = tracker.actor, tracker.reach
     stored = {
         "robot": spec.name,
-        "slots": SLOTS,
         "control_dt": spec.control_dt,
-        "max_distance": tracker.max_distance,
-        "max_speed": tracker.max_speed,
+        "reach": asdict(tracker.reach),
         "observations": actor.observations,
         "actions": actor.actions,
         "hidden": config.sac.hidden,
@@ -79,18 +89,24 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
         "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
     }
     condition = f"{COMMANDS} held-out commands, {SECONDS:g} s"
+    asked = {
+        "goal": f"goals to +-{reach.distance:g} m",
+        "velocity": f"speeds {_ends(reach.speed)} m/s beyond +-{SLOWEST:g}",
+        "stand": f"pitches {_ends(reach.pitch)} rad" if reach.pitch else "",
+    }
     rows = {
-        f"goals to +-5 m, median error, {condition}": f"{figures['goal median']:.4f} m",
-        f"goals to +-5 m, 95th percentile, {condition}": f"{figures['goal p95']:.4f} m",
-        f"speeds +-[1, 3] m/s, median error, {condition}": f"{figures['velocity median']:.4f} m/s",
-        f"speeds +-[1, 3] m/s, 95th percentile, {condition}": f"{figures['velocity p95']:.4f} m/s",
+        f"{asked[name]}, {figure}, {condition}": f"{figures[f'{name} {key}']:.4f} {FAMILIES[index].unit}"
+        for index, name in enumerate(tracker.slots)
+        for key, figure in (("median", "median error"), ("p95", "95th percentile"))
+    }
+    rows |= {
         "zero command: mean speed in the last second": f"{figures['zero speed']:.4f} m/s",
         "fell": f"{100 * figures['fell']:.1f} %",
     }
     steps = config.iterations * config.steps * config.robots
     updates = config.iterations * config.updates
     what = (
-        f"Low-level policy of '{spec.name}' with the slots {' and '.join(SLOTS)}: (joint state, subgoal) -> "
+        f"Low-level policy of '{spec.name}' with the slots {', '.join(tracker.slots)}: (joint state, subgoal) -> "
         f"joint action. Trained on {steps:,} control steps with {updates:,} updates."
     )
     return save_artifact(
@@ -101,3 +117,7 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
         card=card(f"Tracker: {spec.name}", what, run, seed, rows),
         log=run.log,
     )
+
+
+def _ends(ends: tuple[float, float]) -> str:
+    return f"[{ends[0]:g}, {ends[1]:g}]"

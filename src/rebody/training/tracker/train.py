@@ -11,19 +11,20 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int, PRNGKeyArray
+from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import load_tracker
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
-from rebody.control.tracker import Command, Tracker, tracker_observation, tracker_reward
-from rebody.tasks import GOAL
-from rebody.training.ring import draw, write
+from rebody.control.tracker import Command, Motion, Tracker, after, tracker_observation, tracker_reward
+from rebody.training.motion import motion_of
+from rebody.training.ring import draw, newest, write
 from rebody.training.run import Metrics, Run
 from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.orders import Orders, commands, follow_guides, no_orders, renew
 from rebody.training.tracker.report import measure, save_tracker
+from rebody.training.tracker.schedule import schedule
 from rebody.types import AnyArray
 
 EVALUATE_EVERY = 50
@@ -35,10 +36,8 @@ class Replay(eqx.Module):
     joints: Float[AnyArray, "*size joint"]
     action: Float[AnyArray, "*size action"]
     next_joints: Float[AnyArray, "*size joint"]
-    displacement: Float[AnyArray, "*size"]  # m, over the control step
-    pitch: Float[AnyArray, "*size"]  # rad, after it
-    slot: Int[AnyArray, "*size"]
-    value: Float[AnyArray, "*size"]  # command relative to the robot, before the step
+    motion: Motion
+    command: Command  # before the step
 
 
 class RunState(eqx.Module):
@@ -85,6 +84,7 @@ def iterate(state: RunState, batch: RobotBatch, config: TrackerConfig, seed: int
     written = (iteration + 1) * config.steps * config.robots
     transitions = draw(state.replay, written, (config.updates, config.sac.batch_size), rng)
     policy, metrics = learn(state.sac, transitions, learn_key, config, batch.spec.control_dt)
+    metrics |= experience(newest(state.replay, written, config.steps * config.robots), config, batch.spec.control_dt)
     state = eqx.tree_at(
         lambda s: (s.sac, s.physics, s.lying_s, s.iteration),
         state,
@@ -101,35 +101,50 @@ def collect(
 ) -> None:
     """Move every robot by `config.steps` control steps under its orders; write the replay in place."""
     spec, orders = batch.spec, state.orders
+    lasting = schedule(config, int(state.iteration), spec.control_dt)
     first_row = int(state.iteration) * config.steps * config.robots
     for step in range(config.steps):
         order_key, action_key = jax.random.split(jax.random.fold_in(key, step))
-        renew(orders, batch, config, rng, order_key)
+        renew(orders, batch, config, lasting, rng, order_key)
         if step % spec.steps_per_decision == 0:
             follow_guides(orders, spec.observe(batch.qpos, state.previous_qpos), config)
             state.previous_qpos[:] = batch.qpos
-        joints, x, command = spec.joint_state(batch.qpos, batch.qvel), batch.x, commands(orders, batch.x)
+        push(batch, config, rng)
+        joints, before, command = spec.joint_state(batch.qpos, batch.qvel), batch.qpos.copy(), commands(orders, batch)
         action = np.asarray(_explore(state.sac.actor, joints, command, action_key, config))
         batch.step(action)
         seen = Replay(
             joints=joints,
             action=action,
             next_joints=spec.joint_state(batch.qpos, batch.qvel),
-            displacement=(batch.x - x).astype(np.float32),
-            pitch=spec.pitch(batch.qpos).astype(np.float32),
-            slot=command.slot,
-            value=command.value,
+            motion=motion_of(batch, before),
+            command=command,
         )
         write(state.replay, first_row + step * config.robots, seen)
-        reset_the_fallen(state, batch, rng)
+        is_old = orders.age >= lasting.trajectory if lasting.trajectory else np.zeros(config.robots, bool)
+        begin_anew(state, batch, batch.fallen | is_old, rng)
 
 
-def reset_the_fallen(state: RunState, batch: RobotBatch, rng: np.random.Generator) -> None:
-    """A robot that has fallen starts anew; what it did stays in the replay."""
-    fallen = batch.fallen
-    batch.reset(rng, fallen)
-    state.orders.steps_left[fallen] = 0
-    state.previous_qpos[fallen] = batch.qpos[fallen]
+@eqx.filter_jit
+def experience(seen: Replay, config: TrackerConfig, control_dt: float) -> dict[str, Float[AnyArray, ""]]:
+    """What was earned per control step, and how long robots stayed on their feet (thesis, figure 6.12)."""
+    reward = tracker_reward(seen.command, seen.motion, control_dt, seen.action, config.reach, config.reward)
+    seconds = seen.motion.fell.size * control_dt
+    return {"reward": reward.mean(), "falls_per_minute": 60 * seen.motion.fell.sum() / seconds}
+
+
+def push(batch: RobotBatch, config: TrackerConfig, rng: np.random.Generator) -> None:
+    """Now and then something changes a robot's speed."""
+    is_pushed = rng.random(batch.size) < batch.spec.control_dt / config.push_every_s
+    batch.push(np.where(is_pushed, rng.uniform(-config.push, config.push, batch.size), 0.0))
+
+
+def begin_anew(state: RunState, batch: RobotBatch, who: Bool[np.ndarray, " robot"], rng: np.random.Generator) -> None:
+    """Robots that have fallen, or moved for long enough, go back to their rest pose, and get a new order."""
+    batch.reset(rng, who)
+    state.orders.steps_left[who] = 0
+    state.orders.age[who] = 0
+    state.previous_qpos[who] = batch.qpos[who]
 
 
 @eqx.filter_jit
@@ -149,28 +164,17 @@ def relabel(transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, contr
 
     A command is taken to last: afterwards the same goal in the world is nearer, a speed is the same.
     """
-    size = transitions.slot.shape[0]
-    fresh = config.commands.sample(key, (size,))
+    motion, action, reach = transitions.motion, transitions.action, config.reach
+    size = len(motion.pitch)
+    fresh = config.commands.sample(key, motion.pitch - motion.turn, reach)
     renewed = jnp.arange(size) < config.relabelled * size
-    command = Command(
-        jnp.where(renewed, fresh.slot, transitions.slot), jnp.where(renewed, fresh.value, transitions.value)
-    )
-    approached = jnp.where(command.slot == GOAL, transitions.displacement, 0.0)
-    later = Command(command.slot, command.value - approached)
-    limits = (config.commands.max_distance, config.commands.max_speed)
+    command = jax.tree.map(lambda new, old: jnp.where(renewed, new, old), fresh, transitions.command)
     return SACBatch(
-        observation=tracker_observation(transitions.joints, command, *limits),
-        action=transitions.action,
-        reward=tracker_reward(
-            command,
-            transitions.displacement,
-            control_dt,
-            transitions.pitch,
-            transitions.action,
-            config.reward,
-        ),
-        next_observation=tracker_observation(transitions.next_joints, later, *limits),
-        terminal=jnp.zeros(size),
+        observation=tracker_observation(transitions.joints, command, reach),
+        action=action,
+        reward=tracker_reward(command, motion, control_dt, action, reach, config.reward),
+        next_observation=tracker_observation(transitions.next_joints, after(command, motion), reach),
+        terminal=motion.fell.astype(jnp.float32),
     )
 
 
@@ -180,7 +184,10 @@ def initial_state(
     """Robots without orders, an empty replay, a fresh policy or that of an artifact."""
     spec, rows = batch.spec, config.replay
     joints = spec.joint_state(batch.qpos, batch.qvel)
-    policy = sac.initial_state(observation_size(joints), spec.model.nu, config.sac, key)
+    still = Command(np.zeros(len(joints), np.int32), np.zeros(len(joints), np.float32))
+    moved = np.zeros(rows, np.float32)
+    observed = tracker_observation(joints, still, config.reach).shape[-1]
+    policy = sac.initial_state(observed, spec.model.nu, config.sac, key)
     if init_from is not None:
         policy = sac.take_over(policy, load_tracker(init_from).tracker.actor, init_from)
     return RunState(
@@ -189,10 +196,8 @@ def initial_state(
             joints=np.zeros((rows, joints.shape[-1]), np.float32),
             action=np.zeros((rows, spec.model.nu), np.float32),
             next_joints=np.zeros((rows, joints.shape[-1]), np.float32),
-            displacement=np.zeros(rows, np.float32),
-            pitch=np.zeros(rows, np.float32),
-            slot=np.zeros(rows, np.int32),
-            value=np.zeros(rows, np.float32),
+            motion=Motion(moved.copy(), moved.copy(), moved, np.zeros(rows, bool)),
+            command=Command(np.zeros(rows, np.int32), np.zeros(rows, np.float32)),
         ),
         orders=no_orders(config.robots),
         physics=batch.state,
@@ -202,17 +207,10 @@ def initial_state(
     )
 
 
-def observation_size(joints: Float[np.ndarray, "robot joint"]) -> int:
-    """Features that a tracker's policy sees."""
-    still = Command(np.zeros(len(joints), np.int32), np.zeros(len(joints), np.float32))
-    return tracker_observation(joints, still, 1.0, 1.0).shape[-1]
-
-
 def _tracker(state: RunState, config: TrackerConfig) -> Tracker:
-    return Tracker(state.sac.averaged_actor, config.commands.max_distance, config.commands.max_speed)
+    return Tracker(state.sac.averaged_actor, config.reach)
 
 
 @eqx.filter_jit
 def _explore(actor: Actor, joints, command: Command, key: PRNGKeyArray, config: TrackerConfig):
-    limits = config.commands
-    return actor.sample(tracker_observation(joints, command, limits.max_distance, limits.max_speed), key)[0]
+    return actor.sample(tracker_observation(joints, command, config.reach), key)[0]

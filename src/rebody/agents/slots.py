@@ -1,0 +1,55 @@
+"""The bridge's choice: which slot of the tracker a belief is about (thesis 5.6.2, 6.4)."""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Float, Int
+
+from rebody.inference.mixture.padded import MixturePrior
+from rebody.nn import MLP
+from rebody.types import AnyArray, Belief
+
+
+class SlotChooser(eqx.Module):
+    """Belief -> slot, an index into `rebody.tasks.FAMILIES`."""
+
+    @abstractmethod
+    def __call__(self, belief: Belief) -> Int[AnyArray, "*batch"]:
+        """The slot that is addressed."""
+
+
+class OneSlot(SlotChooser):
+    """For a module of one family there is nothing to choose."""
+
+    family: int = eqx.field(static=True)
+
+    def __call__(self, belief: Belief) -> Int[AnyArray, "*batch"]:
+        """Always the same."""
+        return jnp.full(belief.mean.shape[:-1], self.family)
+
+
+class SlotClassifier(SlotChooser):
+    """A logit per slot from the latent, learned with labels on the toy (thesis 6.4)."""
+
+    net: MLP
+    families: tuple[int, ...] = eqx.field(static=True)
+
+    def logits(self, belief: Belief) -> Float[AnyArray, "*batch slot"]:
+        """Of each family's slot, in the order of `families`."""
+        return self.net(belief.mean)
+
+    def __call__(self, belief: Belief) -> Int[AnyArray, "*batch"]:
+        """The likeliest."""
+        return jnp.asarray(self.families)[jnp.argmax(self.logits(belief), axis=-1)]
+
+
+class SlotOfCluster(SlotChooser):
+    """The slot of the mixture's component that a belief belongs to, found on the toy without labels."""
+
+    mixture: MixturePrior
+    slots: Int[AnyArray, " K"]
+
+    def __call__(self, belief: Belief) -> Int[AnyArray, "*batch"]:
+        """That of the likeliest component."""
+        return jnp.asarray(self.slots)[self.mixture.component(belief.mean)]

@@ -1,0 +1,120 @@
+"""Robots from TOML files: one format for the shipped ones and for a user's own."""
+
+import difflib
+import tomllib
+from pathlib import Path
+
+import gymnasium
+import msgspec
+
+from rebody.bodies.robot import Fall, Reach, RobotSpec
+from rebody.errors import RebodyError
+
+SHIPPED = Path(__file__).parent / "robots"
+GYMNASIUM_ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
+GYMNASIUM_PREFIX = "gymnasium:"
+
+
+class _Root(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    x: str | None = None
+    z: str | None = None
+    pitch: str | None = None
+    body: str | None = None
+
+
+class _Fall(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    min_height: float = Fall.min_height
+    max_pitch: float = Fall.max_pitch
+    lasts_s: float = Fall.lasts_s
+
+
+class _Reach(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    speed: tuple[float, float]
+    distance: float = Reach.distance
+    pitch: tuple[float, float] | None = None
+
+
+class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a robot's file says; `RobotSpec` says what it means."""
+
+    mjcf: str
+    frame_skip: int
+    root: _Root
+    fall: _Fall
+    reach: _Reach
+    reset_noise: float = 0.01
+
+
+def shipped_robots() -> tuple[str, ...]:
+    """Names of the robots that come with the package."""
+    return tuple(sorted(path.stem for path in SHIPPED.glob("*.toml")))
+
+
+def load_robot(robot: str) -> RobotSpec:
+    """A shipped robot by name, or one's own by the path of its TOML file; RebodyError if it cannot be had."""
+    if robot in shipped_robots():
+        return _read(SHIPPED / f"{robot}.toml")
+    if robot.endswith(".toml") or "/" in robot:
+        return _read(Path(robot))
+    near = difflib.get_close_matches(robot, shipped_robots(), n=1)
+    hint = f"; did you mean '{near[0]}'?" if near else "."
+    raise RebodyError(
+        f"unknown robot '{robot}'{hint} Robots are: {', '.join(shipped_robots())}, or the path of a robot's TOML file."
+    )
+
+
+def _read(path: Path) -> RobotSpec:
+    """RebodyError if the file is missing, is no TOML, or says something else than a robot's file should."""
+    try:
+        description = msgspec.convert(tomllib.loads(path.read_text()), _Description)
+    except OSError as error:
+        raise RebodyError(f"cannot read the robot's file '{path}': {error.strerror}.") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RebodyError(f"'{path}' is not a TOML file: {error}.") from error
+    except msgspec.ValidationError as error:
+        raise RebodyError(f"'{path}' does not describe a robot: {error}. See docs/own-robot.md.") from error
+    spec = RobotSpec(
+        name=path.stem,
+        mjcf=_mjcf(description.mjcf, path),
+        frame_skip=description.frame_skip,
+        root=_root(description.root, path),
+        reset_noise=description.reset_noise,
+        fall=Fall(**msgspec.structs.asdict(description.fall)),
+        reach=Reach(**msgspec.structs.asdict(description.reach)),
+    )
+    _check_values(spec, path)
+    return spec
+
+
+def _mjcf(mjcf: str, path: Path) -> Path:
+    if mjcf.startswith(GYMNASIUM_PREFIX):
+        return GYMNASIUM_ASSETS / mjcf.removeprefix(GYMNASIUM_PREFIX)
+    return path.parent / mjcf
+
+
+def _root(root: _Root, path: Path) -> tuple[str, str, str] | str:
+    joints = (root.x, root.z, root.pitch)
+    if root.body is not None and joints == (None, None, None):
+        return root.body
+    if root.body is None and root.x and root.z and root.pitch:
+        return root.x, root.z, root.pitch
+    raise RebodyError(
+        f"'{path}': [root] names either the joints that carry x, z and pitch, or the body that floats freely."
+    )
+
+
+def _check_values(spec: RobotSpec, path: Path) -> None:
+    problems = []
+    if spec.frame_skip < 1:
+        problems.append("frame_skip must be at least 1")
+    if not spec.reset_noise >= 0:
+        problems.append("reset_noise must not be negative")
+    if not spec.fall.max_pitch > 0 or not spec.fall.lasts_s >= 0:
+        problems.append("[fall] max_pitch must be positive, lasts_s not negative")
+    low, high = spec.reach.speed
+    if not low < high or not spec.reach.distance > 0:
+        problems.append("[reach] distance must be positive, speed = [slowest, fastest] ascending")
+    if spec.reach.pitch is not None and not spec.reach.pitch[0] < spec.reach.pitch[1]:
+        problems.append("[reach] pitch = [lowest, highest] must be ascending")
+    if problems:
+        raise RebodyError(f"'{path}': {'; '.join(problems)}.")

@@ -1,0 +1,47 @@
+"""`rebody diagnose`."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+
+from rebody.cli.output import check_output
+from rebody.cli.trial import TrialOptions
+from rebody.errors import RebodyError
+from rebody.evaluation.diagnosis import LADDER, diagnose, diagnosis_tables
+from rebody.report.diagnosis import plot_diagnosis
+from rebody.tasks.task_file import read_tasks
+
+
+@dataclass(frozen=True)
+class Diagnose:
+    """Which part lost what: the same tasks by agents that differ by one part each, up to `reuse`."""
+
+    tasks: Path
+    """Task file: [{"family": "goal", "target": -9.0}, ...]."""
+    seeds: int = 1
+    """Every task once per evaluation seed 0 to N-1."""
+    figure: Path | None = None
+    """Where a PNG goes."""
+    trial: Annotated[TrialOptions, tyro.conf.arg(name="")] = field(default_factory=TrialOptions)
+
+    def run(self) -> None:
+        """Evaluate all, print tables, draw."""
+        if self.seeds < 1:
+            raise RebodyError("--seeds must be at least 1.")
+        if self.trial.agent != "reuse" or self.trial.thesis:
+            raise RebodyError("a diagnosis is of `reuse` in its own time: leave --agent and --thesis out.")
+        check_output(self.figure, "--figure", (".png", ".pdf", ".svg"))
+        specs, trial, console = read_tasks(self.tasks), self.trial.load(), Console()
+        with console.status("") as status:
+            diagnosis = diagnose(trial, specs, self.seeds, lambda agent: status.update(_doing(agent)))
+        for table in diagnosis_tables(diagnosis):
+            console.print(table)
+        if self.figure is not None:
+            plot_diagnosis(diagnosis, self.figure)
+
+
+def _doing(agent: str) -> str:
+    return f"{list(LADDER).index(agent) + 1} of {len(LADDER)}: {agent}"

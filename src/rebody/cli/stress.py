@@ -1,0 +1,43 @@
+"""`rebody stress`."""
+
+from dataclasses import dataclass
+
+from rich.console import Console
+
+from rebody.agents.parts import load_tracker
+from rebody.bodies import load_robot
+from rebody.errors import RebodyError
+from rebody.evaluation.stress import CHANGE_S, PUSH, PUSH_S, SECONDS, stress
+
+
+@dataclass(frozen=True)
+class Stress:
+    """Random subgoals and pushes: how often does a robot's tracker let it fall?"""
+
+    robot: str = "hopper"
+    """A robot's name (see `rebody list`), or the path of its TOML file."""
+    tracker: str | None = None
+    """Tracker artifact; default tracker-ROBOT."""
+    episodes: int = 1000
+    """How many times."""
+    seed: int = 0
+    """Seed of subgoals and pushes."""
+
+    def run(self) -> None:
+        """Run them all at once, print what share fell."""
+        if self.episodes < 1:
+            raise RebodyError("--episodes must be at least 1.")
+        spec = load_robot(self.robot)
+        loaded = load_tracker(self.tracker or f"tracker-{spec.name}")
+        if loaded.robot != spec.name:
+            raise RebodyError(f"'{loaded.name}' was trained on '{loaded.robot}', not on '{spec.name}'.")
+        console = Console()
+        with console.status(f"{self.episodes} episodes of {SECONDS:g} s"):
+            result = stress(loaded.tracker, spec, self.episodes, self.seed)
+        console.print(
+            f"{spec.name}, {loaded.name}: subgoals changed every {CHANGE_S[0]:g} to {CHANGE_S[1]:g} s, pushed by "
+            f"+-{PUSH:g} m/s every {PUSH_S[0]:g} to {PUSH_S[1]:g} s, {SECONDS:g} s:\n"
+            f"fallen in {int(result.fell.sum())} of {self.episodes} episodes ({100 * result.fell.mean():.1f} %), "
+            f"lying at the end {int(result.ended_lying.sum())}.",
+            highlight=False,
+        )

@@ -1,0 +1,150 @@
+"""Which part lost what: inference, high level and bridge, or tracker."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from rich.table import Table
+
+from rebody.evaluation.evaluate import Trial, evaluate
+from rebody.evaluation.results import EpisodeResult, Results
+from rebody.tasks import FAMILIES
+from rebody.tasks.figures import LAST_S, tolerance
+from rebody.tasks.task_file import TaskSpec
+from rebody.types import DECISION_DT
+
+LADDER = {
+    "oracle": "the tracker, told the target",
+    "bayes": "+ finding out, with the exact posterior",
+    "readout": "+ the module, its target read linearly",
+    "reuse": "+ the high level and the bridge",
+}
+"""Agents that differ by one part each, in the order in which parts are added."""
+PARTS = ("wrong base task", "wrong slot", "target read", "high level", "tracker")
+SLOT_FROM = 20
+"""Decisions after which a slot counts as right or wrong."""
+_LAST = round(LAST_S / DECISION_DT)
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Where one episode of `reuse` stands at its end, in the unit of its family."""
+
+    base_task_right: bool
+    slot_right: bool
+    read: float
+    """Between the target and what is read from the belief."""
+    high_level: float
+    """Between that and the subgoal."""
+    tracker: float
+    """Between the subgoal and what is reached."""
+
+    @property
+    def culprit(self) -> str:
+        """The part that an error is due to."""
+        if not self.base_task_right:
+            return "wrong base task"
+        if not self.slot_right:
+            return "wrong slot"
+        parts = {"target read": self.read, "high level": self.high_level, "tracker": self.tracker}
+        return max(parts, key=lambda part: parts[part])
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """One set of tasks, done by agents that differ by one part each."""
+
+    results: dict[str, Results]
+
+    def shares(self) -> list[Shares]:
+        """Of each episode of `reuse`."""
+        return [shares_of(episode) for episode in self.results["reuse"].episodes]
+
+    def culprits(self) -> Counter[str]:
+        """How many episodes of `reuse` are out of tolerance by which part's fault."""
+        episodes = self.results["reuse"].episodes
+        failed = [e.final_error > tolerance(e.active_family[-1]) for e in episodes]
+        return Counter(shares.culprit for shares, has_failed in zip(self.shares(), failed, strict=True) if has_failed)
+
+    def wrong_slots(self) -> float:
+        """Share of decisions of `reuse` whose subgoal is in another slot than the task's, once something is known."""
+        of_episode = [
+            np.not_equal(e.subgoal_family, e.active_family)[SLOT_FROM:] for e in self.results["reuse"].episodes
+        ]
+        return float(np.mean(of_episode))
+
+    def lost(self) -> dict[str, float]:
+        """Mean return that each part costs; they add up to the return of `reuse`."""
+        returns = [float(np.mean([e.return_ for e in self.results[agent].episodes])) for agent in LADDER]
+        return {agent: after - before for agent, before, after in zip(LADDER, [0.0, *returns], returns, strict=False)}
+
+
+def diagnose(trial: Trial, specs: list[TaskSpec], seeds: int, tell: Callable[[str], None]) -> Diagnosis:
+    """Every agent of the ladder on every task; `tell` hears which one is next. RebodyError as `evaluate`."""
+    results = {}
+    for agent in LADDER:
+        tell(agent)
+        results[agent] = evaluate(replace(trial, agent=agent), specs, seeds)
+    return Diagnosis(results)
+
+
+def shares_of(episode: EpisodeResult) -> Shares:
+    """Means over the last 2 s; a velocity's are of its mean, so that a gait does not count."""
+    family, target = episode.active_family[-1], episode.active_target[-1]
+    series = {"goal": episode.position_m, "velocity": episode.velocity_m_s, "stand": episode.pitch_rad}
+    read, reached = (float(np.mean(of[-_LAST:])) for of in (episode.inferred_target, series[family]))
+    subgoal = np.mean([np.nan if value is None else value for value in episode.subgoal[-_LAST:]])
+    return Shares(
+        base_task_right=episode.inferred_family[-1] == family and read * target > 0,
+        slot_right=episode.subgoal_family[-1] == family,
+        read=float(abs(read - target)),
+        high_level=float(abs(subgoal - read)),
+        tracker=float(abs(reached - subgoal)),
+    )
+
+
+def diagnosis_tables(diagnosis: Diagnosis) -> list[Table]:
+    """What each part costs, and where `reuse` stands at the end."""
+    return [_ladder(diagnosis), _standing(diagnosis), _failures(diagnosis)]
+
+
+def _ladder(diagnosis: Diagnosis) -> Table:
+    table = Table(title="what each part costs", title_justify="left")
+    families = [f for f in FAMILIES if f.name in diagnosis.results["reuse"].summary["families"]]
+    table.add_column("")
+    for family in families:
+        table.add_column(f"{family.name}: median error \\[{family.unit}]", justify="right")
+    table.add_column("fell [%]".replace("[", "\\["), justify="right")
+    table.add_column("return that it costs", justify="right")
+    lost = diagnosis.lost()
+    for agent, what in LADDER.items():
+        summary = diagnosis.results[agent].summary
+        errors = [f"{summary['families'][family.name]['median_error']['value']:.3f}" for family in families]
+        table.add_row(what, *errors, f"{100 * summary['fell']['value']:.1f}", f"{lost[agent]:.2f}")
+    return table
+
+
+def _standing(diagnosis: Diagnosis) -> Table:
+    table = Table(title="`reuse` in the last 2 s, medians", title_justify="left")
+    for column in ("", "read - target", "subgoal - read", "reached - subgoal", "base task right [%]", "slot right [%]"):
+        table.add_column(column.replace("[", "\\["), justify="right")
+    shares, episodes = diagnosis.shares(), diagnosis.results["reuse"].episodes
+    for family in FAMILIES:
+        of = [s for s, episode in zip(shares, episodes, strict=True) if episode.active_family[-1] == family.name]
+        if of:
+            medians = (np.median([getattr(s, part) for s in of]) for part in ("read", "high_level", "tracker"))
+            right = (100 * np.mean([getattr(s, part) for s in of]) for part in ("base_task_right", "slot_right"))
+            cells = [*(f"{value:.3f}" for value in medians), *(f"{value:.1f}" for value in right)]
+            table.add_row(f"{family.name} \\[{family.unit}]", *cells)
+    table.caption = f"wrong slots after {SLOT_FROM} decisions: {100 * diagnosis.wrong_slots():.2f} %"
+    return table
+
+
+def _failures(diagnosis: Diagnosis) -> Table:
+    table = Table(title="episodes of `reuse` out of tolerance, by the part to blame", title_justify="left")
+    culprits = diagnosis.culprits()
+    for part in PARTS:
+        table.add_column(part, justify="right")
+    table.add_row(*(str(culprits[part]) for part in PARTS))
+    return table

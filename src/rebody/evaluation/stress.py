@@ -1,0 +1,78 @@
+"""Does a tracker stay on its feet? Subgoals that change at random, and pushes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from rebody.agents.controller import TrackerController
+from rebody.agents.rollout import follow
+from rebody.bodies import RobotBatch, RobotSpec
+from rebody.control.tracker import Tracker
+from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.types import Subgoal
+
+SECONDS = 20.0
+CHANGE_S = (1.0, 5.0)
+"""Shortest and longest time between changes of the subgoal [s]."""
+PUSH_S = (3.0, 5.0)
+"""Shortest and longest time between pushes [s]."""
+PUSH = 0.3
+"""What a push adds to the speed of every part, one way or the other [m/s]."""
+
+
+@dataclass(frozen=True)
+class StressResult:
+    """How a test under stress ended."""
+
+    fell: Bool[np.ndarray, " episode"]
+    ended_lying: Bool[np.ndarray, " episode"]
+
+
+class Clock:
+    """Counts down to the next event of each robot."""
+
+    def __init__(self, rng: np.random.Generator, range_s: tuple[float, float], control_dt: float, size: int):
+        self._rng, self._range = rng, tuple(round(seconds / control_dt) for seconds in range_s)
+        self._left = self._draw(size)
+
+    def due(self) -> Bool[np.ndarray, " episode"]:
+        """Whose event is now; counts one control step."""
+        self._left -= 1
+        due = self._left < 0
+        self._left[due] = self._draw(int(due.sum())) - 1
+        return due
+
+    def _draw(self, size: int) -> Int[np.ndarray, " episode"]:
+        return self._rng.integers(self._range[0], self._range[1] + 1, size)
+
+
+def stress(tracker: Tracker, spec: RobotSpec, episodes: int, seed: int = 0) -> StressResult:
+    """Random subgoals within reach, changed every 1 to 5 s for 20 s, and a push every 3 to 5 s."""
+    rng, batch = np.random.default_rng(seed), RobotBatch(spec, episodes)
+    batch.reset(rng)
+    subgoal, fell = _subgoals(tracker, batch, rng), np.zeros(episodes, bool)
+    changes, pushes = (Clock(rng, range_s, spec.control_dt, episodes) for range_s in (CHANGE_S, PUSH_S))
+    for _ in range(round(SECONDS / spec.control_dt)):
+        is_new, fresh = changes.due(), _subgoals(tracker, batch, rng)
+        subgoal = Subgoal(
+            np.where(is_new, fresh.slot, subgoal.slot), np.where(is_new, fresh.value, subgoal.value).astype(np.float32)
+        )
+        batch.push(np.where(pushes.due(), rng.choice([-PUSH, PUSH], episodes), 0.0))
+        follow(TrackerController(tracker), batch, subgoal)
+        fell |= batch.fallen
+    return StressResult(fell, batch.fallen.copy())
+
+
+def _subgoals(tracker: Tracker, batch: RobotBatch, rng: np.random.Generator) -> Subgoal:
+    """One of each robot, within reach of where it is."""
+    reach, size = tracker.reach, batch.size
+    values: list[Float[np.ndarray, " episode"]] = [
+        batch.x + rng.uniform(-reach.distance, reach.distance, size),
+        rng.uniform(*reach.speed, size),
+    ]
+    if reach.pitch is not None:
+        values.append(rng.uniform(*reach.pitch, size))
+    assert (GOAL, VELOCITY, STAND) == (0, 1, 2)
+    slot = rng.integers(len(values), size=size).astype(np.int32)
+    return Subgoal(slot, np.stack(values)[slot, np.arange(size)].astype(np.float32))

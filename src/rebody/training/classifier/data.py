@@ -1,0 +1,102 @@
+"""Beliefs on the toy: what the classifier learns from, and what the slots of clusters are found on."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int, PRNGKeyArray
+
+from rebody.agents.agent import Command, ReuseAgent
+from rebody.agents.build import build_agent
+from rebody.agents.parts import Inference
+from rebody.agents.rollout import Episodes, rollout_on_toy
+from rebody.agents.slots import OneSlot
+from rebody.bodies.toys import Disturbance, Randomisation, no_disturbance
+from rebody.inference.mixture.padded import MixturePrior
+from rebody.tasks import BaseTask, TaskDistribution, achieved
+from rebody.types import AnyArray, Belief, GlobalState, Task
+
+DECISIONS = 200
+KNOWN_FROM = 20
+"""Decisions after which a belief counts in judging slots: before them little is known."""
+HOLD = 5
+"""Decisions for which the toy's tracker thinks of holding an action."""
+
+
+@dataclass(frozen=True)
+class ToyWorld:
+    """The tasks and disturbances that a module was trained on, out of its artifact."""
+
+    tasks: TaskDistribution
+    randomisation: Randomisation
+
+    @classmethod
+    def of(cls, training: dict[str, Any]) -> "ToyWorld":
+        """From the artifact's training settings."""
+        base_tasks = tuple(BaseTask(**base_task) for base_task in training["tasks"]["base_tasks"])
+        ranges: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value
+            for name, value in training["randomisation"].items()
+        }
+        return cls(TaskDistribution(base_tasks), Randomisation(**ranges))
+
+    def draw(self, key: PRNGKeyArray, episodes: int, switch_share: float, *, disturbed: bool):
+        """Active tasks [time, episode], and how each episode's toy departs from the nominal one."""
+        task_key, disturbance_key = jax.random.split(key)
+        tasks = self.tasks.sample_episodes(task_key, episodes, DECISIONS, switch_share)
+        rough = self.randomisation.sample(disturbance_key, (episodes,))
+        return jax.tree.map(lambda leaf: leaf.T, tasks), rough if disturbed else no_disturbance((episodes,))
+
+
+def act(module: Inference, tasks: Task, disturbance: Disturbance) -> Episodes:
+    """What the module believes while its own policy acts on the toy."""
+    agent = build_agent("reuse", module, horizon=1)
+    return rollout_on_toy(agent, module.toy, tasks, module.contract.reward, disturbance)
+
+
+class TrackingToy(ReuseAgent):
+    """`reuse` with a tracker for the toy: the held action whose outcome is nearest to the subgoal.
+
+    So it shows what a slot is worth, as a robot with a tracker would, and costs no robot.
+    """
+
+    def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
+        """The subgoal of the slot, and the action that brings it about."""
+        subgoal = super().command(state, belief, decision).subgoal
+        actions = self.toy.actions
+        steps = jnp.linspace(-1.0, 1.0, 41)
+        candidates = jnp.concatenate([steps[:, None] * jnp.eye(actions)[i] for i in range(actions)])
+
+        def outcome(action: Float[AnyArray, " action"]) -> Float[AnyArray, "*batch"]:
+            body = self.toy.from_global(state)
+            held = jnp.broadcast_to(action, (*state.x.shape, actions))
+            body, _ = jax.lax.scan(lambda b, _: (self.toy.step(b, held, jax.random.key(0)), None), body, length=HOLD)
+            return jnp.abs(achieved(subgoal.slot, self.toy.observe(body)) - subgoal.value)
+
+        nearest = jnp.argmin(jax.vmap(outcome)(candidates), axis=0)
+        return Command(candidates[nearest], subgoal)
+
+
+def slots_of_clusters(module: Inference, tasks: Task, disturbance: Disturbance) -> Int[np.ndarray, " K"]:
+    """For each component of the module's mixture, the slot that earns most on the toy; no labels are used."""
+    mixture = module.parts.mixture
+    assert mixture is not None
+    families = module.contract.families
+    earned = np.stack([_earned(module, mixture, family, tasks, disturbance) for family in families])
+    return np.asarray(families, np.int32)[np.argmax(earned, axis=0)]
+
+
+def _earned(module: Inference, mixture: MixturePrior, family: int, tasks: Task, disturbance: Disturbance):
+    """Mean reward of the decisions in which each component was believed, all subgoals in one slot."""
+    reuse = build_agent("reuse", module)  # as far ahead as on a robot
+    assert isinstance(reuse, ReuseAgent)
+    tracking = TrackingToy(**{name: getattr(reuse, name) for name in reuse.__dataclass_fields__})
+    tracking = replace(tracking, slots=OneSlot(family))
+    episodes = rollout_on_toy(tracking, module.toy, tasks, module.contract.reward, disturbance)
+    believed = eqx.filter_jit(mixture.component)(episodes.belief.mean)[KNOWN_FROM - 1 : -1]
+    is_component = np.asarray(believed)[..., None] == np.arange(len(mixture.active))
+    reward = np.asarray(episodes.reward)[KNOWN_FROM:, :, None]
+    return np.sum(reward * is_component, axis=(0, 1)) / np.maximum(is_component.sum(axis=(0, 1)), 1)

@@ -1,0 +1,109 @@
+"""Training the bridge's classifier (thesis 6.4): binary cross-entropy per slot, on beliefs held on the toy."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from jaxtyping import Array, Float, Int, PRNGKeyArray
+
+from rebody.agents.parts import Inference, load_inference
+from rebody.agents.slots import SlotClassifier
+from rebody.errors import RebodyError
+from rebody.nn import MLP
+from rebody.store import load_artifact
+from rebody.training.classifier.config import ClassifierConfig
+from rebody.training.classifier.data import ToyWorld, act
+from rebody.training.classifier.report import save_slots
+from rebody.training.run import Metrics, Run
+from rebody.types import AnyArray, Belief
+
+
+class RunState(eqx.Module):
+    """Everything that a resumed run needs."""
+
+    classifier: SlotClassifier
+    optimiser: optax.OptState
+    iteration: Int[Array, ""]
+
+
+class Beliefs(eqx.Module):
+    """Beliefs of all decisions of all episodes, and whose slot was wanted."""
+
+    belief: Belief  # [belief, latent]
+    family: Int[AnyArray, " belief"]
+
+
+def train_classifier(inference: str, config: ClassifierConfig, out: Path, seed: int, *, resume: bool = False) -> Path:
+    """Train a classifier and find the slots of the mixture's components; returns the artifact's folder.
+
+    RebodyError if `out` holds another run, or the module knows one family only; Interrupted on Ctrl-C.
+    """
+    module = load_inference(inference)
+    if len(module.contract.families) < 2:
+        raise RebodyError(f"'{module.name}' knows one family only: there is no slot to choose.")
+    run = Run(out, asdict(config) | {"inference": inference, "seed": seed}, resume=resume)
+    world, key = ToyWorld.of(load_artifact(inference, "inference").config["training"]), jax.random.key(seed)
+    seen = listen(module, world, config, jax.random.fold_in(key, 2**31 - 1))
+    state = run.restore(initial_state(module, config, key))
+    state = run.loop(state, lambda state: iterate(state, seen, config, key), config.iterations, "classifier")
+    return save_slots(state.classifier, module, world, config, run, seed)
+
+
+def iterate(state: RunState, seen: Beliefs, config: ClassifierConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
+    """Some updates."""
+    state, value = learn(state, seen, config, jax.random.fold_in(key, int(state.iteration)))
+    return state, {"cross_entropy": float(value)}
+
+
+def listen(module: Inference, world: ToyWorld, config: ClassifierConfig, key: PRNGKeyArray) -> Beliefs:
+    """What the module believes in episodes of its own policy, half of them disturbed."""
+    parts = []
+    for i, disturbed in enumerate((False, True)):
+        tasks, disturbance = world.draw(
+            jax.random.fold_in(key, i), config.episodes // 2, config.switch_share, disturbed=disturbed
+        )
+        parts.append((act(module, tasks, disturbance).belief, tasks.family))
+    belief, family = jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=1), *parts)
+    return Beliefs(jax.tree.map(lambda leaf: leaf.reshape(-1, leaf.shape[-1]), belief), family.ravel())
+
+
+def initial_state(module: Inference, config: ClassifierConfig, key: PRNGKeyArray) -> RunState:
+    """A fresh network."""
+    families = module.contract.families
+    net = MLP(module.parts.module.encoder.latent, len(families), config.hidden, key=key)
+    classifier = SlotClassifier(net, families)
+    return RunState(classifier, _optimiser(config).init(eqx.filter(classifier, eqx.is_array)), jnp.zeros((), jnp.int32))
+
+
+@eqx.filter_jit
+def learn(
+    state: RunState, seen: Beliefs, config: ClassifierConfig, key: PRNGKeyArray
+) -> tuple[RunState, Float[Array, ""]]:
+    """Updates on beliefs drawn from all; returns the mean loss."""
+    arrays, static = eqx.partition(state.classifier, eqx.is_array)
+
+    def step(carry, key):
+        arrays, optimiser = carry
+        chosen = jax.random.randint(key, (config.batch_size,), 0, len(seen.family))
+        some = jax.tree.map(lambda leaf: leaf[chosen], seen)
+        value, gradient = jax.value_and_grad(lambda a: cross_entropy(eqx.combine(a, static), some))(arrays)
+        updates, optimiser = _optimiser(config).update(gradient, optimiser)
+        return (eqx.apply_updates(arrays, updates), optimiser), value
+
+    keys = jax.random.split(key, config.updates)
+    (arrays, optimiser), values = jax.lax.scan(step, (arrays, state.optimiser), keys)
+    return RunState(eqx.combine(arrays, static), optimiser, state.iteration + 1), values.mean()
+
+
+def cross_entropy(classifier: SlotClassifier, seen: Beliefs) -> Float[Array, ""]:
+    """Binary, per slot."""
+    wanted = seen.family[:, None] == np.asarray(classifier.families)
+    return optax.sigmoid_binary_cross_entropy(classifier.logits(seen.belief), wanted.astype(jnp.float32)).mean()
+
+
+def _optimiser(config: ClassifierConfig) -> optax.GradientTransformation:
+    return optax.adam(optax.cosine_decay_schedule(config.learning_rate, config.updates * config.iterations, alpha=0.05))

@@ -1,0 +1,82 @@
+"""What a tracker learns, as a plain Gymnasium environment: for other learners, and to compare them with ours."""
+
+from functools import cached_property, partial
+from typing import Any
+
+import gymnasium
+import jax
+import numpy as np
+from gymnasium import spaces
+
+from rebody.bodies import RobotBatch, load_robot
+from rebody.control.tracker import Command, after, tracker_observation, tracker_reward
+from rebody.training.motion import motion_of
+from rebody.training.tracker.config import TrackerConfig
+from rebody.training.tracker.presets import tracker_preset
+from rebody.types import AnyArray
+
+
+class TrackerEnv(gymnasium.Env):
+    """One robot that is told what to do: its command is part of the observation, and changes now and then.
+
+    Observation and reward are those that `rebody train tracker` learns from; an episode ends with a fall.
+    """
+
+    def __init__(self, robot: str = "cheetah", config: TrackerConfig | None = None):
+        """Commands, their duration and the reward are those of the robot's preset unless given."""
+        self._spec = load_robot(robot)
+        self._config = config or tracker_preset(self._spec)
+        self._batch = RobotBatch(self._spec, 1, threads=1)
+        self.action_space = spaces.Box(-1.0, 1.0, (self._spec.model.nu,), np.float32)
+
+    @cached_property
+    def observation_space(self) -> spaces.Box:
+        """Joint state, then the command."""
+        size = len(self._observe(Command(np.zeros(1, np.int32), np.zeros(1, np.float32))))
+        return spaces.Box(-np.inf, np.inf, (size,), np.float32)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+        """The rest pose, and a new command."""
+        super().reset(seed=seed)
+        self._batch.reset(self.np_random)
+        self._new_command()
+        return self._observe(self._command), {}
+
+    def step(self, action: np.ndarray):
+        """One control step with an action in [-1, 1]; larger ones are clipped."""
+        before = self._batch.qpos.copy()
+        self._batch.step(np.asarray(action, np.float64)[None])
+        motion = motion_of(self._batch, before)
+        told, config = self._command, self._config
+        reward = _reward(told, motion, np.asarray(action, np.float32)[None], self._spec.control_dt, config)
+        self._command = jax.tree.map(np.asarray, after(told, motion))
+        self._steps_left -= 1
+        if self._steps_left < 0:
+            self._new_command()
+        return self._observe(self._command), float(reward[0]), bool(motion.fell[0]), False, {}
+
+    def _new_command(self) -> None:
+        key = jax.random.key(self.np_random.integers(2**32, dtype=np.uint32))
+        pitch = self._spec.pitch(self._batch.qpos).astype(np.float32)
+        self._command = jax.tree.map(np.asarray, _draw(key, pitch, self._config))
+        shortest, longest = (round(seconds / self._spec.control_dt) for seconds in self._config.segment_s)
+        self._steps_left = int(self.np_random.integers(shortest, longest + 1))
+
+    def _observe(self, command: Command) -> np.ndarray:
+        joints = self._spec.joint_state(self._batch.qpos, self._batch.qvel)
+        return np.asarray(_observation(joints, command, self._config))[0]
+
+
+@partial(jax.jit, static_argnames="config")
+def _draw(key, pitch: AnyArray, config: TrackerConfig) -> Command:
+    return config.commands.sample(key, pitch, config.reach)
+
+
+@partial(jax.jit, static_argnames="config")
+def _observation(joints: AnyArray, command: Command, config: TrackerConfig) -> AnyArray:
+    return tracker_observation(joints, command, config.reach)
+
+
+@partial(jax.jit, static_argnames=("control_dt", "config"))
+def _reward(command: Command, motion, action: AnyArray, control_dt: float, config: TrackerConfig) -> AnyArray:
+    return tracker_reward(command, motion, control_dt, action, config.reach, config.reward)

@@ -1,0 +1,21 @@
+"""A tracker's settings for each kind of robot; the command line has the last word."""
+
+from dataclasses import replace
+
+from rebody.bodies import RobotSpec
+from rebody.control.sac import SACConfig
+from rebody.control.tracker import TrackerReward
+from rebody.training.tracker.config import TrackerConfig
+
+
+def tracker_preset(spec: RobotSpec) -> TrackerConfig:
+    """Settings for a robot that lies on its belly when it does nothing, or for one that has to balance."""
+    sprawling = TrackerConfig(reach=spec.reach)
+    if spec.fall.min_height < 0:
+        return sprawling
+    return replace(
+        sprawling,
+        # told of a far goal by its distance alone, it learns to stand there; relative errors make it walk
+        reward=TrackerReward(relative=2.0, alive=0.5),
+        sac=SACConfig(discount=0.99, decay_updates=180_000),
+    )

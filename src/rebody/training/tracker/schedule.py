@@ -1,0 +1,31 @@
+"""How long orders and trajectories last: ours, or the thesis' curriculum (6.4.1)."""
+
+from dataclasses import dataclass
+
+from rebody.training.tracker.config import TrackerConfig
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """What holds at one time of a run; lengths in control steps."""
+
+    trajectory: int | None
+    """After which a robot begins anew in its rest pose; None for never."""
+    segment: tuple[int, int]
+    """Shortest and longest order."""
+    change_when_reached: float
+    """Chance per control step that an order that is carried out is replaced by a new one."""
+
+
+REACHED = 0.1
+"""Within this an order counts as carried out [m, m/s, rad]."""
+_EASY = Schedule(trajectory=300, segment=(300, 300), change_when_reached=0.0)
+_HARD = Schedule(trajectory=1000, segment=(125, 125), change_when_reached=0.2)
+
+
+def schedule(config: TrackerConfig, iteration: int, control_dt: float) -> Schedule:
+    """That of an iteration."""
+    if config.curriculum_iterations:
+        return _EASY if iteration < config.curriculum_iterations else _HARD
+    shortest, longest = (round(seconds / control_dt) for seconds in config.segment_s)
+    return Schedule(None, (shortest, longest), 0.0)

@@ -1,0 +1,154 @@
+"""Robots from TOML files: the shipped ones, one's own, and what is said of a bad file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rebody.bodies import RobotBatch, load_robot, shipped_robots
+from rebody.bodies.robot import Fall, Reach
+from rebody.errors import RebodyError
+
+ANT = Path(__file__).parents[2] / "examples" / "ant" / "ant.toml"
+
+
+def test_these_robots_are_shipped():
+    assert shipped_robots() == ("cheetah", "hopper", "walker")
+
+
+@pytest.mark.parametrize("name", [*shipped_robots(), str(ANT)])
+def test_a_described_robot_can_be_used(name):
+    spec = load_robot(name)
+    assert spec.name == Path(name).stem
+    assert spec.steps_per_decision * spec.control_dt == pytest.approx(0.1)
+    assert spec.reach.speed[0] < 0 < spec.reach.speed[1]
+    batch = RobotBatch(spec, 2, threads=1)
+    batch.reset(np.random.default_rng(0))
+    batch.step(np.zeros((2, spec.model.nu)))
+    assert not batch.fallen.any()
+
+
+@pytest.mark.parametrize("name", ["hopper", "walker"])
+def test_those_that_balance_decide_after_five_steps_of_20_ms(name):
+    spec = load_robot(name)
+    assert spec.control_dt == pytest.approx(0.02)
+    assert spec.steps_per_decision == 5
+
+
+@pytest.mark.parametrize(("name", "lowest", "steepest"), [("hopper", 0.7, 0.7), ("walker", 0.8, 1.0)])
+def test_those_that_balance_fall_when_low_or_aslant(name, lowest, steepest):
+    """At once; the height is that of the torso in the world."""
+    spec = load_robot(name)
+    batch = RobotBatch(spec, 7, threads=1)
+    batch.reset(np.random.default_rng(0))
+    batch.qpos[:] = spec.model.qpos0
+    _, z, pitch = spec.root_addresses
+    batch.qpos[:, z] = [1.25, lowest + 0.01, lowest - 0.01, 1.25, 1.25, 1.25, 1.25]
+    batch.qpos[:, pitch] = [0, 0, 0, steepest - 0.01, steepest + 0.01, -steepest + 0.01, -steepest - 0.01]
+    expected = [False, False, True, False, True, False, True]
+    assert spec.lies(batch.qpos).tolist() == expected
+    batch.qvel[:] = 0
+    batch.qpos[3:, z] = 2.0  # nothing touches the floor, so a step leaves the pitch as it is
+    batch.step(np.zeros((7, spec.model.nu)))
+    assert batch.fallen.tolist()[3:] == expected[3:]
+
+
+def test_the_cheetah_falls_on_its_back_only_and_after_a_second(cheetah):
+    assert cheetah.fall == Fall(max_pitch=2.0, lasts_s=1.0)
+    assert cheetah.reach.pitch == (-1.0472, 1.0472)
+
+
+def test_an_own_robot_is_read_beside_its_model(write_own):
+    spec = load_robot(write_own())
+    assert (spec.name, spec.root, spec.frame_skip, spec.control_dt) == ("own", "trunk", 5, 0.05)
+    assert spec.fall == Fall(max_pitch=1.5)
+    assert spec.reach == Reach(speed=(-1.0, 2.5), distance=5.0, pitch=None)
+    assert spec.reset_noise == 0.01
+    assert spec.model.nu == 1
+    assert spec.torso_height == 0.5
+
+
+def test_every_setting_of_a_file_counts(write_own):
+    path = write_own(
+        [
+            ("frame_skip = 5", "frame_skip = 10\nreset_noise = 0.2"),
+            ("max_pitch = 1.5", "min_height = 0.2\nmax_pitch = 1.1\nlasts_s = 0.3"),
+            ("speed = [-1, 2.5]", "speed = [-2, 2]\ndistance = 7\npitch = [-0.5, 0.4]"),
+        ]
+    )
+    spec = load_robot(path)
+    assert (spec.frame_skip, spec.reset_noise) == (10, 0.2)
+    assert spec.fall == Fall(min_height=0.2, max_pitch=1.1, lasts_s=0.3)
+    assert spec.reach == Reach(speed=(-2.0, 2.0), distance=7.0, pitch=(-0.5, 0.4))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("frame_skip = 5\n", "", "missing required field `frame_skip`"),
+        ("speed = [-1, 2.5]", "distance = 3", r"missing required field `speed` - at `\$\.reach`"),
+        ("frame_skip = 5", "frame_skip = 5\ncolour = 'red'", "unknown field `colour`"),
+        ("max_pitch", "max_roll", r"unknown field `max_roll` - at `\$\.fall`"),
+        ("frame_skip = 5", "frame_skip = '5'", "Expected `int`, got `str`"),
+        ("[-1, 2.5]", "[-1, 0, 2.5]", "length 2"),
+        ("frame_skip = 5", "frame_skip =", "is not a TOML file"),
+        ('body = "trunk"', 'body = "trunk"\nx = "hip"', "either the joints that carry x, z and pitch, or the body"),
+        ('body = "trunk"', 'x = "hip"\nz = "hip"', "either the joints that carry x, z and pitch, or the body"),
+        ('body = "trunk"', "", "either the joints that carry x, z and pitch, or the body"),
+        ("frame_skip = 5", "frame_skip = 0", "frame_skip must be at least 1"),
+        ("frame_skip = 5", "frame_skip = 5\nreset_noise = -0.1", "reset_noise must not be negative"),
+        ("max_pitch = 1.5", "max_pitch = 0", "max_pitch must be positive"),
+        ("max_pitch = 1.5", "lasts_s = -1", "lasts_s not negative"),
+        ("[-1, 2.5]", "[2.5, -1]", "ascending"),
+        ("[-1, 2.5]", "[nan, 1]", "ascending"),
+        ("[reach]", "[reach]\ndistance = 0", "distance must be positive"),
+        ("[reach]", "[reach]\npitch = [1, -1]", r"pitch = \[lowest, highest\] must be ascending"),
+    ],
+)
+def test_a_bad_file_is_named_with_what_is_wrong(write_own, old, new, says):
+    path = write_own([(old, new)])
+    with pytest.raises(RebodyError, match=says) as raised:
+        load_robot(path)
+    assert path in str(raised.value)
+
+
+def test_all_that_is_out_of_range_is_said_at_once(write_own):
+    path = write_own([("frame_skip = 5", "frame_skip = 0"), ("[-1, 2.5]", "[1, 1]")])
+    with pytest.raises(RebodyError, match=r"frame_skip must.*; .*speed"):
+        load_robot(path)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    for path in (tmp_path / "none.toml", tmp_path / "folder.toml"):
+        (tmp_path / "folder.toml").mkdir(exist_ok=True)
+        with pytest.raises(RebodyError, match=f"cannot read the robot's file '{path}'"):
+            load_robot(str(path))
+
+
+def test_bytes_that_are_no_text_are_no_toml(tmp_path):
+    path = tmp_path / "picture.toml"
+    path.write_bytes(b"\x89PNG\xff")
+    with pytest.raises(RebodyError, match=r"picture\.toml' is not a TOML file"):
+        load_robot(str(path))
+
+
+@pytest.mark.parametrize(
+    ("toml", "mjcf", "says"),
+    [
+        ([("own.xml", "other.xml")], [], r"robot 'own': MuJoCo cannot read '.*other\.xml'"),
+        ([("own.xml", "gymnasium:ants.xml")], [], r"robot 'own': MuJoCo cannot read '.*ants\.xml'"),
+        ([], [("<worldbody>", "<worldbod>")], r"robot 'own': MuJoCo cannot read '.*own\.xml'"),
+        ([], [('joint="hip"', 'joint="knee"')], r"robot 'own': MuJoCo cannot use '.*own\.xml'.*knee"),
+        ([('"trunk"', '"torso"')], [], "robot 'own': its model has no body 'torso' that floats freely"),
+        ([('"trunk"', '"leg"')], [], "robot 'own': its model has no body 'leg' that floats freely"),
+    ],
+)
+def test_a_model_that_cannot_be_used_is_named(write_own, toml, mjcf, says):
+    spec = load_robot(write_own(toml, mjcf))
+    with pytest.raises(RebodyError, match=f"(?s){says}"):
+        _ = spec.model
+
+
+def test_an_unknown_name_is_no_path():
+    with pytest.raises(RebodyError, match=r"did you mean 'hopper'\?.*cheetah, hopper, walker, or the path"):
+        load_robot("hoper")
