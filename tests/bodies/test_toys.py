@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from rebody.bodies.toys import (
-    MIRRORED,
     FullToy,
     MassDamper,
     PositionToy,
@@ -359,20 +358,3 @@ def test_toys_have_names():
     assert make_toy("position") == PositionToy()
     with pytest.raises(RebodyError, match=r"unknown toy 'spring'\. Toys are: mass-damper, position, full"):
         make_toy("spring")
-
-
-@pytest.mark.parametrize("kind", list(MIRRORED))
-def test_front_and_back_can_be_exchanged(kind):
-    """What is mirrored moves as its mirror image: x, pitch and their speeds change sign, z does not."""
-    toy, rng = make_toy(kind), np.random.default_rng(0)
-    x, vx, pitch = rng.normal(size=(3, 20)).astype("f4")
-    action = rng.uniform(-1, 1, (20, toy.actions)).astype("f4")
-    body, image = toy.initial(x, vx, pitch=pitch), toy.initial(-x, -vx, pitch=-pitch)
-    for _ in range(5):
-        body = toy.step(body, jnp.asarray(action), jax.random.key(0))
-        image = toy.step(image, jnp.asarray(action * np.array(MIRRORED[kind], "f4")), jax.random.key(0))
-    seen, mirrored = toy.observe(body), toy.observe(image)
-    for field in ("x", "vx", "pitch", "pitch_rate"):
-        np.testing.assert_allclose(getattr(mirrored, field), -getattr(seen, field), atol=1e-6)
-    np.testing.assert_allclose(mirrored.z, seen.z, atol=1e-6)
-    assert np.abs(seen.x).min() > 0

@@ -258,10 +258,6 @@ def make_toy(kind: str, **settings: float) -> Toy:
     return TOYS[kind](**settings)
 
 
-MIRRORED = {"position": (-1.0,), "mass-damper": (-1.0,), "full": (-1.0, 1.0, -1.0)}
-"""Which of a toy's actions change sign when front and back are exchanged: forces along x and torques do."""
-
-
 def describe_toy(toy: Toy) -> dict[str, Any]:
     """What `make_toy` needs to make it again."""
     kind = next(name for name, make in TOYS.items() if make is type(toy))

@@ -136,21 +136,6 @@ def test_the_oracle_is_told_the_task_that_is_on_at_every_decision(labelled, conf
         np.testing.assert_allclose(observation[:, 2:].T, expected, rtol=1e-6)
 
 
-def test_front_and_back_are_exchanged_in_half_of_what_is_learned_of_interpreted_beliefs(labelled, config):
-    """States, places and actions change sign; shares, doubts and rewards do not."""
-    split = replace(config, inference=replace(config.inference, kinds=1), policy_scales=(1.0, 1.0))
-    told = tell(labelled, split)  # one share, one place
-    plain, mirrored = (sample_transitions(told, 3, c, jax.random.key(0)) for c in (config, split))
-    plain = replace(plain, observation=plain.observation * np.array([10.0, 3.5, 1, 1, 1, 1], "f4"))
-    np.testing.assert_array_equal(mirrored.reward, plain.reward)
-    is_mirrored = np.asarray(mirrored.observation[:, 1] < 0)  # all speeds in this replay are positive
-    assert 0.35 < is_mirrored.mean() < 0.65
-    sign = np.where(is_mirrored, -1.0, 1.0)[:, None]
-    np.testing.assert_array_equal(mirrored.action, sign * plain.action)
-    turns = np.concatenate([sign, sign, 0 * sign + 1, sign, 0 * sign + 1, 0 * sign + 1], axis=1)
-    np.testing.assert_allclose(mirrored.observation, turns * plain.observation, rtol=1e-5)
-
-
 @pytest.fixture(scope="module")
 def switched(labelled):
     """The replay, its episodes a speed forward until decision 5, then a goal behind."""

@@ -76,7 +76,7 @@ def goal_velocity() -> MetaConfig:
         arrival_width=0.02,
         policy_fields=("x", "vx"),
         policy_scales=(10.0, 3.0),
-        start=(20.0, 3.0),
+        start=(15.0, 3.0),
         turn_probability=0.08,
         switch_share=0.5,
         episodes=96,

@@ -12,10 +12,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import InferenceParts, load_inference, task_code
-from rebody.bodies.toys import MIRRORED, Toy, make_toy
+from rebody.bodies.toys import Toy, make_toy
 from rebody.control import sac
 from rebody.control.high_level import HighLevelPolicy, policy_observation
 from rebody.control.sac import SACBatch, SACState
@@ -243,7 +243,7 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
 
 def sample_transitions(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray) -> SACBatch:
     """Decisions of nominal episodes, with the beliefs before and after."""
-    group_key, episode_key, time_key, mirror_key = jax.random.split(key, 4)
+    group_key, episode_key, time_key = jax.random.split(key, 3)
     size = (config.sac.batch_size,)
     group = jax.random.randint(group_key, size, 0, stored)
     episode = jax.random.randint(episode_key, size, 0, config.episodes // 2)
@@ -253,26 +253,12 @@ def sample_transitions(replay: Episodes, stored, config: MetaConfig, key: PRNGKe
         state, belief = jax.tree.map(lambda leaf: leaf[group, episode, time], (replay.state, replay.belief))
         return policy_observation(state, belief, config.policy_fields, config.policy_scales)
 
-    batch = SACBatch(
+    return SACBatch(
         observation=observation(time),
         action=replay.action[group, episode, time],
         reward=_shaped(replay.reward[group, episode, time], config),
         next_observation=observation(time + 1),
         terminal=jnp.zeros(size),
-    )
-    return mirror(batch, jax.random.bernoulli(mirror_key, shape=size), config) if config.inference.kinds else batch
-
-
-def mirror(batch: SACBatch, chosen: Bool[AnyArray, " batch"], config: MetaConfig) -> SACBatch:
-    """The chosen transitions as they would be with front and back exchanged, which the toy does not tell apart.
-
-    Beliefs must be interpreted, so that it is plain which of their numbers change sign: places do, shares do not.
-    """
-    fields, places = len(config.policy_fields), (batch.observation.shape[-1] - len(config.policy_fields)) // 4
-    signs = jnp.concatenate([-jnp.ones(fields), jnp.ones(places), -jnp.ones(places), jnp.ones(2 * places)])
-    seen, done = (jnp.where(chosen[:, None], turned, 1.0) for turned in (signs, jnp.asarray(MIRRORED[config.toy])))
-    return SACBatch(
-        batch.observation * seen, batch.action * done, batch.reward, batch.next_observation * seen, batch.terminal
     )
 
 
