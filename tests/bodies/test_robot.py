@@ -209,7 +209,6 @@ def test_what_a_model_says_of_its_joints_does_not_hold_it_to_the_plane(write_own
     np.testing.assert_allclose(held, floating, atol=2e-3)
 
 
-@pytest.mark.xfail(reason="stiffness and friction of a model's default joint reach the joints of the plane")
 @pytest.mark.parametrize("more", ['stiffness="30"', 'frictionloss="5"'])
 def test_no_spring_and_no_friction_holds_it_to_the_plane(write_own, more):
     old, new = DEFAULTS

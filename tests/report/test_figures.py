@@ -47,8 +47,9 @@ def assert_drawn(path):
         [episode_of(4.0)],
         [episode_of(0.0, error=0.0)],
         [episode_of(1.5, "velocity"), episode_of(-1.0, "velocity")],
+        [episode_of(4.0), episode_of(-1.5, "velocity"), episode_of(0.8, "stand")],
     ],
-    ids=["many", "one", "a target of zero", "velocity"],
+    ids=["many", "one", "a target of zero", "velocity", "three families"],
 )
 def test_transfer(episodes, tmp_path):
     results = results_of(*episodes)

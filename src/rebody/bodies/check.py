@@ -48,6 +48,8 @@ def _root(spec: RobotSpec) -> list[Finding]:
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
     wanted = (("x", slide, 0, "slide along x"), ("z", slide, 2, "slide along z"), ("pitch", hinge, 1, "hinge about y"))
     names = [spec.model.joint(i).name for i in range(spec.model.njnt)]
+    data = mujoco.MjData(spec.model)
+    mujoco.mj_forward(spec.model, data)  # axes in the world: a body may be turned in its model
     findings = []
     for joint, (field, kind, axis, what) in zip(spec.root_joints, wanted, strict=True):
         if joint not in names:
@@ -55,7 +57,7 @@ def _root(spec: RobotSpec) -> list[Finding]:
             findings.append(Finding(field, False, says))
             continue
         found = spec.model.joint(joint)
-        is_right = found.type[0] == kind and found.axis[axis] > 0.99
+        is_right = found.type[0] == kind and data.xaxis[found.id][axis] > 0.99
         findings.append(Finding(field, bool(is_right), f"joint '{joint}'" + ("" if is_right else f" is no {what}")))
     return findings
 
@@ -98,8 +100,11 @@ def _forward(spec: RobotSpec) -> Finding:
     batch.reset(np.random.default_rng(0))
     before = batch.qpos.copy()
     batch.push(np.ones(1))
-    for _ in range(spec.steps_per_decision):
-        batch.step(np.zeros((1, spec.model.nu)))
+    try:
+        for _ in range(spec.steps_per_decision):
+            batch.step(np.zeros((1, spec.model.nu)))
+    except RebodyError as error:
+        return Finding("readout", False, str(error))
     speed = float(spec.observe(batch.qpos, before).vx[0])
     return Finding("readout", speed > 0, f"pushed by 1 m/s, it reads {speed:.2f} m/s over the first decision")
 

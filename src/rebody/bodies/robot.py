@@ -187,7 +187,7 @@ def _hold_to_plane(spec: mujoco.MjSpec, body_name: str, robot: str) -> None:
     axes = ((slide, [1, 0, 0]), (slide, [0, 0, 1]), (hinge, [0, 1, 0]))
     for name, (kind, axis) in zip(PLANE_JOINTS, axes, strict=True):
         joint = body.add_joint(name=name, type=kind, axis=axis, limited=False, armature=0)
-        joint.damping[:] = 0  # whatever the model's defaults say
+        joint.damping[:], joint.stiffness[:], joint.frictionloss = 0, 0, 0  # whatever the model's defaults say
     for key in list(spec.keys):  # they have a number more than the joints now
         spec.delete(key)
 

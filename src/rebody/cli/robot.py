@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from rebody.bodies import load_robot
@@ -27,7 +28,7 @@ class Robot:
         findings = check_robot(spec)
         table = Table(show_header=False, box=None, padding=(0, 2))
         for finding in findings:
-            table.add_row("ok" if finding.is_right else "[bold red]wrong[/]", finding.subject, finding.says)
+            table.add_row("ok" if finding.is_right else "[bold red]wrong[/]", finding.subject, escape(finding.says))
         console = Console()
         console.print(table)
         wrong = [finding.subject for finding in findings if not finding.is_right]

@@ -14,6 +14,9 @@ from rebody.training.flat import FlatConfig, train_flat
 from rebody.training.inference import PRESETS, MetaConfig, train_inference
 from rebody.training.tracker import TrackerConfig, tracker_preset, train_tracker
 
+USUAL_ROBOT = "cheetah"
+"""Whose settings the help shows where no robot is named."""
+
 
 @dataclass(frozen=True)
 class TrainInference:
@@ -47,7 +50,7 @@ class TrainTracker:
     config: Annotated[TrackerConfig, tyro.conf.arg(name="")]
     out: Path = tyro.MISSING
     """Folder of the run, and of the artifact that it becomes."""
-    robot: str = "cheetah"
+    robot: str = tyro.MISSING
     """A robot's name (see `rebody list`), or the path of its TOML file."""
     seed: int = 0
     """Seed of everything that is random."""
@@ -121,8 +124,9 @@ def train_command(arguments: list[str]) -> type:
     # made here, since the defaults are known only now
     inference: Any = Annotated[TrainInference, tyro.conf.subcommand("inference", default=default, prefix_name=False)]
     robot = _wanted("--robot", arguments) if "tracker" in arguments else None
-    spec = load_robot(robot or TrainTracker.robot)
-    on_robot = TrainTracker(config=tracker_preset(spec), robot=robot or TrainTracker.robot)
+    spec = load_robot(robot or USUAL_ROBOT)
+    named = {"robot": robot} if robot else {}
+    on_robot = TrainTracker(config=tracker_preset(spec), **named)
     tracker: Any = Annotated[TrainTracker, tyro.conf.subcommand("tracker", default=on_robot, prefix_name=False)]
     classifier: Any = Annotated[TrainClassifier, tyro.conf.subcommand("classifier", prefix_name=False)]
     flat: Any = Annotated[TrainFlat, tyro.conf.subcommand("flat", prefix_name=False)]

@@ -9,7 +9,8 @@ from rebody.envs.bodies import PointMasses, Robots
 from rebody.envs.single import TaskEnv
 from rebody.envs.vector import TaskVectorEnv
 
-_POINT_MASS = {"render_modes": ["rgb_array"], "render_fps": 10}
+_PICTURES = {"render_modes": ["rgb_array"]}
+_POINT_MASS = _PICTURES | {"render_fps": 10}
 _NEXT_STEP = {"autoreset_mode": AutoresetMode.NEXT_STEP}
 
 
@@ -36,6 +37,8 @@ class PointMassVectorEnv(TaskVectorEnv):
 class RobotEnv(TaskEnv):
     """A robot: observation qpos with x, then qvel; an action per actuator; a step is its control step."""
 
+    metadata = _PICTURES
+
     def __init__(self, robot: str, **settings: Any):
         """`robot` is a shipped name or the path of a TOML file; settings as `TaskEnv` has them."""
         spec = load_robot(robot)
@@ -46,6 +49,8 @@ class RobotEnv(TaskEnv):
 class RobotVectorEnv(TaskVectorEnv):
     """Many robots, stepped on several threads."""
 
+    metadata = _PICTURES | _NEXT_STEP
+
     def __init__(self, robot: str, num_envs: int = 1, threads: int = 0, **settings: Any):
         """`threads` = 0 uses every processor; the rest as for `RobotEnv` and `TaskVectorEnv`."""
         spec = load_robot(robot)
@@ -54,4 +59,4 @@ class RobotVectorEnv(TaskVectorEnv):
 
 
 def _robot_metadata(spec: RobotSpec) -> dict[str, Any]:
-    return {"render_modes": ["rgb_array"], "render_fps": round(1 / spec.control_dt)}
+    return _PICTURES | {"render_fps": round(1 / spec.control_dt)}

@@ -21,7 +21,6 @@ def test_held_out_speeds_fill_the_reach_but_for_the_slowest(ends, backward):
     assert speeds.min() == pytest.approx(ends[0] if backward else 0.3, abs=0.01)
 
 
-@pytest.mark.xfail(reason="a reach is not looked at between -0.3 and 0.3 m/s, and taken to begin there")
 @pytest.mark.parametrize("ends", [(-0.2, 0.2), (0.5, 3.0), (-3.0, -0.5)])
 def test_no_speed_beyond_the_reach_is_held_out(ends):
     """Of a slow robot, and of one that cannot stand still."""

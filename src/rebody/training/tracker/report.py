@@ -53,7 +53,8 @@ def measure(tracker: Tracker, spec: RobotSpec) -> dict[str, float]:
 def speeds_within(reach: Reach, size: int, rng: np.random.Generator) -> Float[np.ndarray, " size"]:
     """Speeds that may be asked for, none of them close to zero [m/s]."""
     slowest, fastest = reach.speed
-    ranges = [ends for ends in ((slowest, -SLOWEST), (SLOWEST, fastest)) if ends[0] < ends[1]]
+    both_ways = ((slowest, min(-SLOWEST, fastest)), (max(SLOWEST, slowest), fastest))
+    ranges = [ends for ends in both_ways if ends[0] < ends[1]] or [(slowest, fastest)]
     lengths = np.array([high - low for low, high in ranges])
     which = rng.choice(len(ranges), size, p=lengths / lengths.sum())
     low, high = np.array(ranges)[which].T

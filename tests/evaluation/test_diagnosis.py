@@ -1,0 +1,93 @@
+"""Which part lost what."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from rebody.evaluation.diagnosis import LADDER, Diagnosis, diagnose, diagnosis_tables, shares_of
+from rebody.evaluation.results import EpisodeResult, Results
+from rebody.report.diagnosis import plot_diagnosis
+from rebody.tasks.task_file import TaskSpec
+
+TIME = 40
+
+
+def episode_of(family="goal", target=4.0, *, read=None, subgoal=None, reached=None, slot=None, guessed=None, paid=-9.0):
+    """An episode that ends where it is told to; whatever is not said is as it should be."""
+    read = target if read is None else read
+    subgoal = read if subgoal is None else subgoal
+    reached = subgoal if reached is None else reached
+    x, v = ([reached] * TIME, [0.0] * TIME) if family == "goal" else ([0.0] * TIME, [reached] * TIME)
+    return EpisodeResult(
+        family=family, target=target, seed=0, switch=None, time_s=(0.1 * np.arange(1, TIME + 1)).tolist(),
+        position_m=x, velocity_m_s=v, pitch_rad=[0.0] * TIME, vz_max_m_s=[0.0] * TIME, reward=[paid / TIME] * TIME,
+        active_family=[family] * TIME, active_target=[target] * TIME, inferred_family=[guessed or family] * TIME,
+        inferred_target=[read] * TIME, cluster=[0] * TIME, latent=[[0.0, 0.0]] * TIME,
+        subgoal_family=[slot or family] * TIME, subgoal=[subgoal] * TIME, fell=False, return_=paid, oracle_return=-5.0,
+        final_error=abs(reached - target), final_squared_error=0.0, ripple_m_s=0.0,
+    )  # fmt: skip
+
+
+def results_of(*episodes, agent="reuse"):
+    return Results("cheetah", agent, "tiny", "tiny-tracker", 0.05, 1, 15, False, list(episodes))
+
+
+def diagnosis_of(*episodes):
+    others = {agent: results_of(*episodes, agent=agent) for agent in LADDER}
+    return Diagnosis(others | {"reuse": results_of(*episodes)})
+
+
+@pytest.mark.parametrize(
+    ("episode", "culprit"),
+    [
+        (episode_of(read=-4.0, subgoal=4.0, reached=9.0), "wrong base task"),
+        (episode_of(guessed="velocity", reached=9.0), "wrong base task"),
+        (episode_of(slot="velocity", reached=9.0), "wrong slot"),
+        (episode_of(read=3.0, subgoal=2.9, reached=2.8), "target read"),
+        (episode_of(read=3.9, subgoal=2.9, reached=2.8), "high level"),
+        (episode_of("velocity", 2.0, read=1.9, subgoal=1.8, reached=0.5), "tracker"),
+    ],
+)
+def test_the_part_to_blame(episode, culprit):
+    assert shares_of(episode).culprit == culprit
+    assert diagnosis_of(episode, episode_of()).culprits() == {culprit: 1}
+
+
+def test_shares_are_distances_along_the_chain():
+    shares = shares_of(episode_of(read=3.9, subgoal=3.6, reached=3.5))
+    np.testing.assert_allclose([shares.read, shares.high_level, shares.tracker], [0.1, 0.3, 0.1], atol=1e-9)
+
+
+def test_nobody_is_to_blame_within_tolerance():
+    assert not diagnosis_of(episode_of(reached=4.2), episode_of("velocity", 2.0, reached=1.9)).culprits()
+
+
+def test_what_parts_cost_adds_up_to_the_return():
+    paid = dict(zip(LADDER, (-5.0, -6.0, -8.5, -9.0), strict=True))
+    diagnosis = Diagnosis({agent: results_of(episode_of(paid=value), agent=agent) for agent, value in paid.items()})
+    assert diagnosis.lost() == pytest.approx({"oracle": -5.0, "bayes": -1.0, "readout": -2.5, "reuse": -0.5})
+
+
+def test_early_slots_do_not_count():
+    late = episode_of()
+    wrong = replace(late, subgoal_family=["velocity"] * 30 + ["goal"] * (TIME - 30))
+    assert diagnosis_of(late, wrong).wrong_slots() == pytest.approx(10 / (2 * (TIME - 20)))
+
+
+def test_every_agent_does_the_same_tasks(trial, tmp_path):
+    told = []
+    diagnosis = diagnose(trial, [TaskSpec("goal", 3.0), TaskSpec("goal", -2.0)], 1, told.append)
+    assert told == list(LADDER)
+    assert [results.agent for results in diagnosis.results.values()] == told
+    assert len({tuple(e.target for e in results.episodes) for results in diagnosis.results.values()}) == 1
+    console = Console(width=200, record=True, file=io.StringIO())
+    for table in diagnosis_tables(diagnosis):
+        console.print(table)
+    text = console.export_text()
+    assert all(what in text for what in LADDER.values())
+    assert f"{diagnosis.results['bayes'].summary['families']['goal']['median_error']['value']:.3f}" in text
+    plot_diagnosis(diagnosis, tmp_path / "d.png")
+    assert (tmp_path / "d.png").stat().st_size > 10_000
