@@ -1,6 +1,6 @@
 """`rebody train`: every shipped artifact is made by these commands."""
 
-from dataclasses import dataclass, field, make_dataclass, replace
+from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -125,9 +125,8 @@ def train_command(arguments: list[str]) -> type:
     inference: Any = Annotated[TrainInference, tyro.conf.subcommand("inference", default=default, prefix_name=False)]
     robot = _wanted("--robot", arguments) if "tracker" in arguments else None
     spec = load_robot(robot or USUAL_ROBOT)
-    on_robot = TrainTracker(config=tracker_preset(spec))
-    if robot is not None:
-        on_robot = replace(on_robot, robot=robot)
+    config = tracker_preset(spec)
+    on_robot = TrainTracker(config=config, robot=robot) if robot else TrainTracker(config=config)
     tracker: Any = Annotated[TrainTracker, tyro.conf.subcommand("tracker", default=on_robot, prefix_name=False)]
     classifier: Any = Annotated[TrainClassifier, tyro.conf.subcommand("classifier", prefix_name=False)]
     flat: Any = Annotated[TrainFlat, tyro.conf.subcommand("flat", prefix_name=False)]
