@@ -29,8 +29,8 @@ from rebody.tasks import GOAL, VELOCITY
 from rebody.tasks.figures import final_error
 from rebody.training.tracker import tracker_preset
 from rebody.training.tracker import train as ours
-from rebody.training.tracker.report import COMMANDS, SECONDS, speeds_within
-from rebody.types import DECISION_DT, Subgoal, Task
+from rebody.training.tracker.report import COMMANDS, run_robots, speeds_within
+from rebody.types import Subgoal, Task
 
 ENVIRONMENT = "rebody/HalfCheetahTracker-v0"
 SPEC = load_robot("cheetah")
@@ -70,15 +70,13 @@ def errors(predict: Predict) -> dict[str, float]:
     value = [rng.uniform(-reach.distance, reach.distance, COMMANDS), speeds_within(reach, COMMANDS, rng)]
     slot = np.repeat([GOAL, VELOCITY], COMMANDS).astype(np.int32)
     subgoal = Subgoal(slot, np.concatenate(value).astype(np.float32))
-    batch, states = RobotBatch(SPEC, len(slot)), []
-    batch.reset(np.random.default_rng(0))
-    for _ in range(round(SECONDS / DECISION_DT)):
-        before = batch.qpos.copy()
-        for _ in range(SPEC.steps_per_decision):
-            x, pitch = (where.astype(np.float32) for where in (batch.x, SPEC.pitch(batch.qpos)))
-            batch.step(predict(np.asarray(_observe(SPEC.joint_state(batch.qpos, batch.qvel), subgoal, x, pitch))))
-        states.append(SPEC.observe(batch.qpos, before))
-    found = final_error(Task(slot, subgoal.value), jax.tree.map(lambda *leaves: np.stack(leaves), *states))
+
+    def control_step(batch: RobotBatch) -> None:
+        x, pitch = (where.astype(np.float32) for where in (batch.x, SPEC.pitch(batch.qpos)))
+        batch.step(predict(np.asarray(_observe(SPEC.joint_state(batch.qpos, batch.qvel), subgoal, x, pitch))))
+
+    states, _ = run_robots(SPEC, len(slot), control_step)
+    found = final_error(Task(slot, subgoal.value), states)
     return {"goal": float(np.median(found[slot == GOAL])), "velocity": float(np.median(found[slot == VELOCITY]))}
 
 

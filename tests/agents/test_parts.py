@@ -6,7 +6,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.agents.build import AGENTS, check_fit
 from rebody.agents.parts import inference_template, load_flat, load_inference, load_tracker
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import FullToy, MassDamper, PositionToy, describe_toy
@@ -129,14 +128,13 @@ def test_a_module_of_before_there_were_mixtures_has_none(saved, stored_config):
     assert load_inference(saved()).parts.mixture is None
 
 
-def test_check_fit_names_the_robot(inference):
-    for kind in AGENTS:
-        check_fit(kind, inference, "cheetah", ("x", "vx"), SLOTS)
-        with pytest.raises(RebodyError, match="sees x, which 'gripper' does not have"):
-            check_fit(kind, inference, "gripper", ("z",), SLOTS)
-
-        with pytest.raises(RebodyError, match="no slot for goal"):
-            check_fit(kind, inference, "cheetah", ("x", "vx"), ("velocity",))
+def test_what_does_not_fit_names_the_robot(inference):
+    check_body = inference.contract.check_body
+    check_body("cheetah", ("x", "vx"), SLOTS)
+    with pytest.raises(RebodyError, match="sees x, which 'gripper' does not have"):
+        check_body("gripper", ("z",), SLOTS)
+    with pytest.raises(RebodyError, match="no slot for goal"):
+        check_body("cheetah", ("x", "vx"), ("velocity",))
 
 
 def test_the_tiny_parts_are_not_all_alike(inference):

@@ -5,7 +5,7 @@ from typing import Literal
 import jax.numpy as jnp
 
 from rebody.agents.agent import Agent, FlatAgent, IdleAgent, OracleAgent, ReadoutAgent, ReuseAgent
-from rebody.agents.parts import Inference, LoadedSlots
+from rebody.agents.parts import Inference, LoadedFlat, LoadedSlots, LoadedTracker
 from rebody.agents.slots import OneSlot, SlotChooser, SlotOfCluster
 from rebody.errors import RebodyError
 from rebody.inference.exact import exact_posterior, read_mode
@@ -23,8 +23,6 @@ AGENTS = {
     "idle": "knows nothing and stands still",
 }
 """Every kind of agent, and what it is."""
-
-
 SlotsBy = Literal["classifier", "clusters"]
 """How `reuse` chooses a tracker's slot: by a classifier on the latent, or by the mixture's components."""
 
@@ -35,11 +33,19 @@ def check_agent(kind: str) -> None:
         raise RebodyError(f"unknown agent '{kind}'. Agents are: {', '.join(AGENTS)}.")
 
 
-def check_fit(
-    kind: str, inference: Inference, robot: str, moving_fields: tuple[str, ...], slots: tuple[str, ...]
-) -> None:
-    """RebodyError if this module cannot work on this robot with a tracker of these slots."""
-    inference.contract.check_body(robot, moving_fields, slots)
+def check_robot_of(part: LoadedTracker | LoadedFlat, robot: str) -> None:
+    """RebodyError if a policy was trained on another robot."""
+    if part.robot != robot:
+        raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{robot}'.")
+
+
+def check_module_of(what: str, part: LoadedFlat | LoadedSlots, inference: Inference) -> None:
+    """RebodyError if a part, called `what`, was trained on the beliefs of another module."""
+    if part.inference_hash != tree_hash(inference.parts.module):
+        raise RebodyError(
+            f"{what} '{part.name}' was trained on the beliefs of another module than '{inference.name}'. "
+            "Use that one (its card names it), or train it anew."
+        )
 
 
 def slot_chooser(inference: Inference, loaded: LoadedSlots | None, by: SlotsBy) -> SlotChooser:
@@ -55,11 +61,7 @@ def slot_chooser(inference: Inference, loaded: LoadedSlots | None, by: SlotsBy) 
                 "slot (rebody train classifier)."
             )
         return OneSlot(families[0])
-    if loaded.inference_hash != tree_hash(inference.parts.module):
-        raise RebodyError(
-            f"classifier '{loaded.name}' was trained on the beliefs of another module than '{inference.name}'. "
-            "Use that one (its card names it), or train it anew."
-        )
+    check_module_of("classifier", loaded, inference)
     if by == "classifier":
         return loaded.parts.classifier
     if inference.parts.mixture is None:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from rebody.agents.agent import Observation
-from rebody.agents.build import HORIZON, build_agent, check_fit, slot_chooser
+from rebody.agents.build import HORIZON, build_agent, slot_chooser
 from rebody.agents.controller import TrackerController
 from rebody.agents.parts import Inference, LoadedSlots, LoadedTracker, load_inference, load_slots_of, load_tracker
 from rebody.agents.rollout import begin, decide, joint_action
@@ -28,7 +28,7 @@ class LiveAgent:
         horizon: int = HORIZON,
     ):
         """RebodyError if the module does not fit the robot."""
-        check_fit("reuse", inference, spec.name, spec.moving_fields, tracker.tracker.slots)
+        inference.contract.check_body(spec.name, spec.moving_fields, tracker.tracker.slots)
         self._spec, self._inference = spec, inference
         self._controller = TrackerController(tracker.tracker)
         self._agent = build_agent(

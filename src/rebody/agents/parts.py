@@ -95,7 +95,7 @@ def inference_template(config: dict[str, Any]) -> InferenceParts:
     """Parts of the right shapes, to be filled with weights."""
     inference, policy, mixture = config["inference"], config["high_level"], config.get("mixture")
     actions = make_toy(**config["toy"]).actions
-    settings = InferenceConfig(**{name: _as_tuple(value) for name, value in inference.items()})
+    settings = InferenceConfig(**with_tuples(inference))
     ranges = config["contract"]["target_ranges"]
     weights = np.zeros((settings.latent + 1, len(ranges)), np.float32)
     return InferenceParts(
@@ -110,7 +110,7 @@ def inference_template(config: dict[str, Any]) -> InferenceParts:
 def tracker_template(config: dict[str, Any]) -> Tracker:
     """A tracker of the right shapes, to be filled with weights."""
     actor = _actor_template(config["observations"], config["actions"], config)
-    return Tracker(actor, Reach(**{name: _as_tuple(value) for name, value in config["reach"].items()}))
+    return Tracker(actor, Reach(**with_tuples(config["reach"])))
 
 
 def flat_template(config: dict[str, Any]) -> FlatPolicy:
@@ -197,5 +197,6 @@ def _actor_template(observations: int, actions: int, config: dict[str, Any]) -> 
     return Actor(observations, actions, sizes, jax.random.key(0))
 
 
-def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+def with_tuples(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings as they were before JSON made lists of their tuples."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}

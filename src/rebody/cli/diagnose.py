@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
-from rebody.cli.output import check_output
+from rebody.cli.output import PICTURES, check_output
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation.diagnosis import LADDER, diagnose, diagnosis_tables
@@ -33,7 +33,7 @@ class Diagnose:
             raise RebodyError("--seeds must be at least 1.")
         if self.trial.agent != "reuse" or self.trial.thesis:
             raise RebodyError("a diagnosis is of `reuse` in its own time: leave --agent and --thesis out.")
-        check_output(self.figure, "--figure", (".png", ".pdf", ".svg"))
+        check_output(self.figure, "--figure", PICTURES)
         specs, trial, console = read_tasks(self.tasks), self.trial.load(), Console()
         with console.status("") as status:
             diagnosis = diagnose(trial, specs, self.seeds, lambda agent: status.update(_doing(agent)))

@@ -4,6 +4,9 @@ from pathlib import Path
 
 from rebody.errors import RebodyError
 
+PICTURES = (".png", ".pdf", ".svg")
+"""Suffixes of figures."""
+
 
 def check_output(path: Path | None, option: str, suffixes: tuple[str, ...] = ()) -> None:
     """RebodyError, before any work is done, for a path that no file (of these kinds, if any) can be written to."""

@@ -8,7 +8,7 @@ import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from rebody.cli.output import check_output
+from rebody.cli.output import PICTURES, check_output
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate
@@ -32,7 +32,7 @@ class RunTask:
 
     def run(self) -> None:
         """Run the episode and print its end."""
-        check_output(self.figure, "--figure", (".png", ".pdf", ".svg"))
+        check_output(self.figure, "--figure", PICTURES)
         check_output(self.video, "--video", (".mp4",))
         spec = parse_task(self.task)
         trial = self.trial.load()

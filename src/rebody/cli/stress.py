@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from rich.console import Console
 
+from rebody.agents.build import check_robot_of
 from rebody.agents.parts import load_tracker
 from rebody.bodies import load_robot
 from rebody.errors import RebodyError
@@ -29,8 +30,7 @@ class Stress:
             raise RebodyError("--episodes must be at least 1.")
         spec = load_robot(self.robot)
         loaded = load_tracker(self.tracker or f"tracker-{spec.name}")
-        if loaded.robot != spec.name:
-            raise RebodyError(f"'{loaded.name}' was trained on '{loaded.robot}', not on '{spec.name}'.")
+        check_robot_of(loaded, spec.name)
         console = Console()
         with console.status(f"{self.episodes} episodes of {SECONDS:g} s"):
             result = stress(loaded.tracker, spec, self.episodes, self.seed)

@@ -81,15 +81,17 @@ def slots_of(reach: Reach) -> tuple[str, ...]:
 
 def relative(subgoal: Subgoal, x: Float[AnyArray, "*batch"], pitch: Float[AnyArray, "*batch"]) -> Command:
     """A subgoal as the robot sees it now: a goal is a point in the world, so its distance shrinks [m, rad]."""
-    here = jnp.where(subgoal.slot == GOAL, x, jnp.where(subgoal.slot == STAND, pitch, 0.0))
-    return Command(subgoal.slot, subgoal.value - here)
+    return Command(subgoal.slot, jnp.subtract(subgoal.value, of_slot(subgoal.slot, x, pitch)))
 
 
 def after(command: Command, motion: Motion) -> Command:
     """The same subgoal as it is seen after a motion."""
-    done = jnp.where(command.slot == GOAL, motion.displacement, 0.0)
-    done = jnp.where(command.slot == STAND, motion.turn, done)
-    return Command(command.slot, command.value - done)
+    return Command(command.slot, jnp.subtract(command.value, of_slot(command.slot, motion.displacement, motion.turn)))
+
+
+def of_slot(slot: Int[AnyArray, "*batch"], x: Float[AnyArray, "*batch"], pitch: Float[AnyArray, "*batch"]):
+    """What a slot is about, [*batch]: x [m] for goals, pitch [rad] for stands, 0 for speeds; of NumPy or JAX."""
+    return (slot == GOAL) * x + (slot == STAND) * pitch
 
 
 def tracker_observation(
@@ -124,15 +126,16 @@ def tracker_reward(
     miss, velocity = jnp.abs(left), motion.displacement / control_dt
     is_goal, is_stand = command.slot == GOAL, command.slot == STAND
     arrival = weights.arrival * 0.1 / (0.1 + miss)
-    goal = arrival - weights.distance * miss
-    stand = arrival - weights.turn * miss
-    linear = jnp.where(is_goal, goal, -weights.speed * jnp.abs(command.value - velocity))
     if weights.relative:
         slowest, fastest = reach.speed
         wanted = jnp.where(is_goal, jnp.clip(1.5 * left, slowest, fastest), command.value)
         relative_error = jnp.abs(wanted - velocity) / jnp.maximum(jnp.abs(wanted), 0.5)
-        linear = weights.relative * jnp.maximum(1 - relative_error, -0.5) + jnp.where(is_goal, arrival, 0.0)
+        moving = weights.relative * jnp.maximum(1 - relative_error, -0.5) + jnp.where(is_goal, arrival, 0.0)
+    else:
+        goal = arrival - weights.distance * miss
+        moving = jnp.where(is_goal, goal, -weights.speed * jnp.abs(command.value - velocity))
+    stand = arrival - weights.turn * miss
     posture = jnp.where(is_stand, 0.0, weights.upright * (1 - jnp.cos(motion.pitch)))
     posture = posture + weights.energy * jnp.mean(action**2, axis=-1)
     alive = weights.alive * (1.0 - motion.fell)
-    return jnp.where(is_stand, stand, linear) - posture + alive
+    return jnp.where(is_stand, stand, moving) - posture + alive

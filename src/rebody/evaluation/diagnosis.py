@@ -9,7 +9,7 @@ from rich.table import Table
 
 from rebody.evaluation.evaluate import Trial, evaluate
 from rebody.evaluation.results import EpisodeResult, Results
-from rebody.tasks import FAMILIES
+from rebody.tasks import FAMILIES, Family
 from rebody.tasks.figures import LAST_S, tolerance
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import DECISION_DT
@@ -57,15 +57,16 @@ class Diagnosis:
 
     results: dict[str, Results]
 
-    def shares(self) -> list[Shares]:
-        """Of each episode of `reuse`."""
-        return [shares_of(episode) for episode in self.results["reuse"].episodes]
+    @property
+    def families(self) -> list[Family]:
+        """Those of the tasks."""
+        return [family for family in FAMILIES if self.results["reuse"].of(family.name)]
 
     def culprits(self) -> Counter[str]:
         """How many episodes of `reuse` are out of tolerance by which part's fault."""
         episodes = self.results["reuse"].episodes
-        failed = [e.final_error > tolerance(e.active_family[-1]) for e in episodes]
-        return Counter(shares.culprit for shares, has_failed in zip(self.shares(), failed, strict=True) if has_failed)
+        failed = [e for e in episodes if e.final_error > tolerance(e.active_family[-1])]
+        return Counter(shares_of(episode).culprit for episode in failed)
 
     def wrong_slots(self) -> float:
         """Share of decisions of `reuse` whose subgoal is in another slot than the task's, once something is known."""
@@ -92,8 +93,7 @@ def diagnose(trial: Trial, specs: list[TaskSpec], seeds: int, tell: Callable[[st
 def shares_of(episode: EpisodeResult) -> Shares:
     """Means over the last 2 s; a velocity's are of its mean, so that a gait does not count."""
     family, target = episode.active_family[-1], episode.active_target[-1]
-    series = {"goal": episode.position_m, "velocity": episode.velocity_m_s, "stand": episode.pitch_rad}
-    read, reached = (float(np.mean(of[-_LAST:])) for of in (episode.inferred_target, series[family]))
+    read, reached = (float(np.mean(of[-_LAST:])) for of in (episode.inferred_target, episode.reached))
     subgoal = np.mean([np.nan if value is None else value for value in episode.subgoal[-_LAST:]])
     return Shares(
         base_task_right=episode.inferred_family[-1] == family and read * target > 0,
@@ -111,11 +111,11 @@ def diagnosis_tables(diagnosis: Diagnosis) -> list[Table]:
 
 def _ladder(diagnosis: Diagnosis) -> Table:
     table = Table(title="what each part costs", title_justify="left")
-    families = [f for f in FAMILIES if f.name in diagnosis.results["reuse"].summary["families"]]
+    families = diagnosis.families
     table.add_column("")
     for family in families:
         table.add_column(f"{family.name}: median error \\[{family.unit}]", justify="right")
-    table.add_column("fell [%]".replace("[", "\\["), justify="right")
+    table.add_column("fell \\[%]", justify="right")
     table.add_column("return that it costs", justify="right")
     lost = diagnosis.lost()
     for agent, what in LADDER.items():
@@ -129,14 +129,12 @@ def _standing(diagnosis: Diagnosis) -> Table:
     table = Table(title="`reuse` in the last 2 s, medians", title_justify="left")
     for column in ("", "read - target", "subgoal - read", "reached - subgoal", "base task right [%]", "slot right [%]"):
         table.add_column(column.replace("[", "\\["), justify="right")
-    shares, episodes = diagnosis.shares(), diagnosis.results["reuse"].episodes
-    for family in FAMILIES:
-        of = [s for s, episode in zip(shares, episodes, strict=True) if episode.active_family[-1] == family.name]
-        if of:
-            medians = (np.median([getattr(s, part) for s in of]) for part in ("read", "high_level", "tracker"))
-            right = (100 * np.mean([getattr(s, part) for s in of]) for part in ("base_task_right", "slot_right"))
-            cells = [*(f"{value:.3f}" for value in medians), *(f"{value:.1f}" for value in right)]
-            table.add_row(f"{family.name} \\[{family.unit}]", *cells)
+    for family in diagnosis.families:
+        of = [shares_of(episode) for episode in diagnosis.results["reuse"].of(family.name)]
+        medians = (np.median([getattr(s, part) for s in of]) for part in ("read", "high_level", "tracker"))
+        right = (100 * np.mean([getattr(s, part) for s in of]) for part in ("base_task_right", "slot_right"))
+        cells = [*(f"{value:.3f}" for value in medians), *(f"{value:.1f}" for value in right)]
+        table.add_row(f"{family.name} \\[{family.unit}]", *cells)
     table.caption = f"wrong slots after {SLOT_FROM} decisions: {100 * diagnosis.wrong_slots():.2f} %"
     return table
 

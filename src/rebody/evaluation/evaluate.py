@@ -7,7 +7,15 @@ import numpy as np
 from jaxtyping import Int
 
 from rebody.agents.agent import Agent
-from rebody.agents.build import HORIZON, SlotsBy, build_agent, check_agent, check_fit, slot_chooser
+from rebody.agents.build import (
+    HORIZON,
+    SlotsBy,
+    build_agent,
+    check_agent,
+    check_module_of,
+    check_robot_of,
+    slot_chooser,
+)
 from rebody.agents.controller import Controller, FlatController, TrackerController
 from rebody.agents.parts import Inference, LoadedFlat, LoadedSlots, LoadedTracker
 from rebody.agents.rollout import Episodes, OnFrame, rollout_on_robot, rollout_on_toy
@@ -16,7 +24,6 @@ from rebody.bodies.toys import Toy
 from rebody.control.tracker import slots_of
 from rebody.errors import RebodyError
 from rebody.evaluation.results import Results, episode_results
-from rebody.store import tree_hash
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, Task
 
@@ -148,15 +155,12 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
             raise RebodyError("agent 'flat' moves the joints of a robot, and a point mass has none.")
         return
     slots = trial.tracker.tracker.slots if trial.tracker else slots_of(trial.robot.reach)
-    check_fit(trial.agent, trial.inference, trial.robot.name, trial.robot.moving_fields, slots)
+    trial.inference.contract.check_body(trial.robot.name, trial.robot.moving_fields, slots)
     for part in (trial.tracker, trial.flat):
-        if part is not None and part.robot != trial.robot.name:
-            raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{trial.robot.name}'.")
-    if trial.flat is not None and trial.flat.inference_hash != tree_hash(trial.inference.parts.module):
-        raise RebodyError(
-            f"flat policy '{trial.flat.name}' was trained on the beliefs of another module than "
-            f"'{trial.inference.name}'. Use that one (its card names it), or train it anew."
-        )
+        if part is not None:
+            check_robot_of(part, trial.robot.name)
+    if trial.flat is not None:
+        check_module_of("flat policy", trial.flat, trial.inference)
 
 
 def _check_tasks(trial: Trial, specs: list[TaskSpec]) -> None:

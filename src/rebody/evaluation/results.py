@@ -51,6 +51,12 @@ class EpisodeResult:
     final_squared_error: float
     ripple_m_s: float
 
+    @property
+    def reached(self) -> list[float]:
+        """The number that the last task is about, after each decision [m, m/s, rad]."""
+        series = {"goal": self.position_m, "velocity": self.velocity_m_s, "stand": self.pitch_rad}
+        return series[self.active_family[-1]]
+
     def to_json(self) -> dict[str, Any]:
         """Under the names of the file format."""
         entry = asdict(self)
@@ -73,6 +79,10 @@ class Results:
     horizon: int
     thesis: bool
     episodes: list[EpisodeResult]
+
+    def of(self, family: str) -> list[EpisodeResult]:
+        """Episodes whose last task is of that family."""
+        return [episode for episode in self.episodes if episode.active_family[-1] == family]
 
     @cached_property
     def summary(self) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Figures of evaluations: trajectories, errors and latents."""
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -19,10 +20,13 @@ def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) 
     columns = len(families) + 1
     with figure(path, 2, columns, size=(4.7 * columns, 7.4)) as (drawing, panels):
         for i, family in enumerate(families):
-            _trajectories(panels[i], _of(family, results))
+            _trajectories(panels[i], results.of(family))
             agents = {"reuse": results, "oracle": oracle, "idle": idle}
-            _errors(panels[columns + i], {name: _of(family, of) for name, of in agents.items()}, family)
-        _latents(panels[columns - 1], results, families)
+            _errors(panels[columns + i], {name: of.of(family) for name, of in agents.items()}, family)
+        if len(families) > 1:
+            _kinds(panels[columns - 1], results, families)
+        else:
+            _latents(panels[columns - 1], results)
         _readings(panels[-1], results, families)
         drawing.suptitle(
             f"Inference module '{results.inference}', trained on a point mass, on the {results.robot}: "
@@ -43,7 +47,7 @@ def plot_episode(episode: EpisodeResult, path: Path) -> None:
 def draw_progress(axes: Axes, episode: EpisodeResult, until: int | None = None) -> None:
     """Reached, believed and true value over time, up to a decision."""
     unit = _unit(episode.active_family[-1])
-    reached = _reached(episode)
+    reached = episode.reached
     axes.plot(episode.time_s, episode.active_target, "--", color=TRUTH, label="hidden target")
     axes.plot(episode.time_s[:until], episode.inferred_target[:until], color=BELIEF, label="read from the belief")
     axes.plot(episode.time_s[:until], reached[:until], color=MOTION, lw=2, label="robot")
@@ -58,46 +62,39 @@ def draw_progress(axes: Axes, episode: EpisodeResult, until: int | None = None) 
     axes.legend(loc="lower right", frameon=False, fontsize=8)
 
 
-def _reached(episode: EpisodeResult) -> list[float]:
-    """The number that the last task is about."""
-    series = {"goal": episode.position_m, "velocity": episode.velocity_m_s, "stand": episode.pitch_rad}
-    return series[episode.active_family[-1]]
-
-
-def _of(family: str, results: Results) -> list[EpisodeResult]:
-    return [episode for episode in results.episodes if episode.active_family[-1] == family]
-
-
 def _trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:
     largest, family = max(abs(e.active_target[-1]) for e in episodes) or 1.0, episodes[0].active_family[-1]
     for episode in episodes:
         colour = plt.get_cmap(TASKS)(0.5 + 0.5 * episode.active_target[-1] / largest)
-        axes.plot(episode.time_s, _reached(episode), color=colour, lw=1.2)
+        axes.plot(episode.time_s, episode.reached, color=colour, lw=1.2)
         axes.plot(episode.time_s[-1], episode.active_target[-1], "o", color=colour, ms=4, clip_on=False)
     axes.set(xlabel="time [s]", ylabel=f"{family} [{_unit(family)}]", title=f"{family}: robot (lines), targets (dots)")
 
 
-def _latents(axes: Axes, results: Results, families: list[str]) -> None:
-    """Against the target where there is one family; which of several it is shows in the latent's first numbers."""
+def _kinds(axes: Axes, results: Results, families: list[str]) -> None:
+    """Which of several families it is shows in the latent's first numbers."""
     for family, colour in zip(families, FAMILY_COLOURS, strict=False):
-        of = _of(family, results)
-        final = np.array([episode.latent[-1] for episode in of])
-        if len(families) > 1:
-            axes.plot(final[:, 0], final[:, 1], ".", color=colour, label=family)
-            continue
-        for dimension in range(final.shape[1]):
-            axes.plot([e.active_target[-1] for e in of], final[:, dimension], ".", label=f"latent {dimension + 1}")
-    if len(families) > 1:
-        axes.set(xlabel="latent 1", ylabel="latent 2", title="the belief at the end: what kind of task")
-    else:
-        axes.set(xlabel=f"hidden target [{_unit(families[0])}]", ylabel="latent mean", title="the belief at the end")
+        final = np.array([episode.latent[-1] for episode in results.of(family)])
+        axes.plot(final[:, 0], final[:, 1], ".", color=colour, label=family)
+    axes.set(xlabel="latent 1", ylabel="latent 2", title="the belief at the end: what kind of task")
+    axes.legend(frameon=False)
+
+
+def _latents(axes: Axes, results: Results) -> None:
+    """Of one family: the whole latent against the target."""
+    targets = [episode.active_target[-1] for episode in results.episodes]
+    final = np.array([episode.latent[-1] for episode in results.episodes])
+    for dimension in range(final.shape[1]):
+        axes.plot(targets, final[:, dimension], ".", label=f"latent {dimension + 1}")
+    unit = _unit(results.episodes[0].active_family[-1])
+    axes.set(xlabel=f"hidden target [{unit}]", ylabel="latent mean", title="the belief at the end")
     axes.legend(frameon=False)
 
 
 def _readings(axes: Axes, results: Results, families: list[str]) -> None:
     """What a linear probe reads from the last belief, over what is true."""
     for family, colour in zip(families, FAMILY_COLOURS, strict=False):
-        of = _of(family, results)
+        of = results.of(family)
         truth = [episode.active_target[-1] for episode in of]
         read = [episode.inferred_target[-1] for episode in of]
         axes.plot(truth, read, "o", color=colour, mfc="none", label=f"{family} [{_unit(family)}]")
@@ -109,16 +106,21 @@ def _readings(axes: Axes, results: Results, families: list[str]) -> None:
 def _errors(axes: Axes, agents: dict[str, list[EpisodeResult]], family: str) -> None:
     colours = {"reuse": MOTION, "oracle": ORACLE, "idle": IDLE}
     for name, episodes in agents.items():
-        errors = np.sort([max(episode.final_error, 1e-3) for episode in episodes])
-        share = np.arange(1, len(errors) + 1) / len(errors)
-        axes.step(errors, 100 * share, where="post", label=name, color=colours[name])
+        draw_errors(axes, episodes, label=name, color=colours[name])
     axes.set(
-        xscale="log",
         xlabel=f"{family}: final error [{_unit(family)}]",
         ylabel="episodes with at most this error [%]",
         title="what inference brings",
     )
     axes.legend(frameon=False, loc="upper center")
+
+
+def draw_errors(axes: Axes, episodes: list[EpisodeResult], **style: Any) -> None:
+    """Which share of episodes has at most which final error; a millimetre stands for anything below it."""
+    errors = np.sort([max(episode.final_error, 1e-3) for episode in episodes])
+    share = np.arange(1, len(errors) + 1) / len(errors)
+    axes.step(errors, 100 * share, where="post", **style)
+    axes.set(xscale="log")
 
 
 def _unit(family: str) -> str:

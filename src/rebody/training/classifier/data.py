@@ -1,6 +1,6 @@
 """Beliefs on the toy: what the classifier learns from, and what the slots of clusters are found on."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import equinox as eqx
@@ -11,7 +11,7 @@ from jaxtyping import Float, Int, PRNGKeyArray
 
 from rebody.agents.agent import Command, ReuseAgent
 from rebody.agents.build import build_agent
-from rebody.agents.parts import Inference
+from rebody.agents.parts import Inference, with_tuples
 from rebody.agents.rollout import Episodes, rollout_on_toy
 from rebody.agents.slots import OneSlot
 from rebody.bodies.toys import Disturbance, Randomisation, no_disturbance
@@ -37,11 +37,7 @@ class ToyWorld:
     def of(cls, training: dict[str, Any]) -> "ToyWorld":
         """From the artifact's training settings."""
         base_tasks = tuple(BaseTask(**base_task) for base_task in training["tasks"]["base_tasks"])
-        ranges: dict[str, Any] = {
-            name: tuple(value) if isinstance(value, list) else value
-            for name, value in training["randomisation"].items()
-        }
-        return cls(TaskDistribution(base_tasks), Randomisation(**ranges))
+        return cls(TaskDistribution(base_tasks), Randomisation(**with_tuples(training["randomisation"])))
 
     def draw(self, key: PRNGKeyArray, episodes: int, switch_share: float, *, disturbed: bool):
         """Active tasks [time, episode], and how each episode's toy departs from the nominal one."""
@@ -91,10 +87,8 @@ def slots_of_clusters(module: Inference, tasks: Task, disturbance: Disturbance) 
 
 def _earned(module: Inference, mixture: MixturePrior, family: int, tasks: Task, disturbance: Disturbance):
     """Mean reward of the decisions in which each component was believed, all subgoals in one slot."""
-    reuse = build_agent("reuse", module)  # as far ahead as on a robot
-    assert isinstance(reuse, ReuseAgent)
-    tracking = TrackingToy(**{name: getattr(reuse, name) for name in reuse.__dataclass_fields__})
-    tracking = replace(tracking, slots=OneSlot(family))
+    reuse = build_agent("reuse", module, slots=OneSlot(family))  # as far ahead as on a robot
+    tracking = TrackingToy(**{field.name: getattr(reuse, field.name) for field in fields(reuse)})
     episodes = rollout_on_toy(tracking, module.toy, tasks, module.contract.reward, disturbance)
     believed = eqx.filter_jit(mixture.component)(episodes.belief.mean)[KNOWN_FROM - 1 : -1]
     is_component = np.asarray(believed)[..., None] == np.arange(len(mixture.active))

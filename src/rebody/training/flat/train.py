@@ -13,7 +13,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int, PRNGKeyArray
 
-from rebody.agents.build import check_fit
 from rebody.agents.parts import Inference, load_flat, load_inference
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
@@ -80,7 +79,7 @@ def train_flat(
     spec, module = load_robot(robot), load_inference(inference)
     if config.steps < spec.steps_per_decision:
         raise RebodyError(f"--steps must be at least the {spec.steps_per_decision} control steps of a decision.")
-    check_fit("flat", module, spec.name, spec.moving_fields, slots_of(spec.reach))
+    module.contract.check_body(spec.name, spec.moving_fields, slots_of(spec.reach))
     settings = {"robot": robot, "inference": inference, "seed": seed, "init_from": init_from}
     run = Run(out, asdict(config) | settings, resume=resume)
     batch = RobotBatch(spec, config.robots)

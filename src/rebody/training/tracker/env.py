@@ -12,7 +12,9 @@ from rebody.bodies import RobotBatch, load_robot
 from rebody.control.tracker import Command, after, tracker_observation, tracker_reward
 from rebody.training.motion import motion_of
 from rebody.training.tracker.config import TrackerConfig
+from rebody.training.tracker.orders import draw_commands
 from rebody.training.tracker.presets import tracker_preset
+from rebody.training.tracker.schedule import segment_steps
 from rebody.types import AnyArray
 
 
@@ -58,18 +60,13 @@ class TrackerEnv(gymnasium.Env):
     def _new_command(self) -> None:
         key = jax.random.key(self.np_random.integers(2**32, dtype=np.uint32))
         pitch = self._spec.pitch(self._batch.qpos).astype(np.float32)
-        self._command = jax.tree.map(np.asarray, _draw(key, pitch, self._config))
-        shortest, longest = (round(seconds / self._spec.control_dt) for seconds in self._config.segment_s)
+        self._command = jax.tree.map(np.asarray, draw_commands(key, pitch, self._config))
+        shortest, longest = segment_steps(self._config, self._spec.control_dt)
         self._steps_left = int(self.np_random.integers(shortest, longest + 1))
 
     def _observe(self, command: Command) -> np.ndarray:
         joints = self._spec.joint_state(self._batch.qpos, self._batch.qvel)
         return np.asarray(_observation(joints, command, self._config))[0]
-
-
-@partial(jax.jit, static_argnames="config")
-def _draw(key, pitch: AnyArray, config: TrackerConfig) -> Command:
-    return config.commands.sample(key, pitch, config.reach)
 
 
 @partial(jax.jit, static_argnames="config")

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
 from rebody.bodies import RobotBatch
-from rebody.control.tracker import Command
+from rebody.control.tracker import Command, of_slot
 from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.training.tracker.commands import ToyGuide
 from rebody.training.tracker.config import TrackerConfig
@@ -59,8 +59,8 @@ def renew(
         return
     spec = batch.spec
     pitch = spec.pitch(batch.qpos).astype(np.float32)
-    drawn = jax.tree.map(np.asarray, _draw(key, pitch, config))
-    here = _here(drawn.slot, batch.x, pitch)
+    drawn = jax.tree.map(np.asarray, draw_commands(key, pitch, config))
+    here = of_slot(drawn.slot, batch.x, pitch)
     shortest, longest = lasting.segment
     new = Orders(
         slot=drawn.slot,
@@ -91,17 +91,13 @@ def follow_guides(orders: Orders, state: GlobalState, config: TrackerConfig) -> 
 
 def commands(orders: Orders, batch: RobotBatch) -> Command:
     """Orders as the robots see them: a goal in the world becomes a distance."""
-    value = orders.value - _here(orders.slot, batch.x, batch.spec.pitch(batch.qpos))
+    value = orders.value - of_slot(orders.slot, batch.x, batch.spec.pitch(batch.qpos))
     return Command(orders.slot.copy(), value.astype(np.float32))
 
 
-def _here(slot: Int[np.ndarray, " robot"], x: Float[np.ndarray, " robot"], pitch: Float[np.ndarray, " robot"]):
-    """What each order is relative to."""
-    return np.where(slot == GOAL, x, np.where(slot == STAND, pitch, 0.0))
-
-
 @partial(jax.jit, static_argnames="config")
-def _draw(key: PRNGKeyArray, pitch: Float[AnyArray, " robot"], config: TrackerConfig) -> Command:
+def draw_commands(key: PRNGKeyArray, pitch: Float[AnyArray, " robot"], config: TrackerConfig) -> Command:
+    """`CommandDistribution.sample`, compiled."""
     return config.commands.sample(key, pitch, config.reach)
 
 

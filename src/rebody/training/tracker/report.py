@@ -1,5 +1,6 @@
 """What a tracker does that is told the truth, and the artifact that it leaves behind."""
 
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -39,7 +40,8 @@ def measure(tracker: Tracker, spec: RobotSpec) -> dict[str, float]:
         np.concatenate([slot, np.full(len(zeros), GOAL), np.full(len(zeros), VELOCITY)]).astype(np.int32),
         np.concatenate([*values, zeros, zeros]).astype(np.float32),
     )
-    states, fell = _run(tracker, spec, command)
+    controller = TrackerController(tracker)
+    states, fell = run_robots(spec, len(command.slot), lambda batch: follow(controller, batch, command))
     errors = final_error(Task(command.slot, command.value), states)
     figures = {}
     for index, name in enumerate(tracker.slots):
@@ -61,15 +63,17 @@ def speeds_within(reach: Reach, size: int, rng: np.random.Generator) -> Float[np
     return rng.uniform(low, high)
 
 
-def _run(tracker: Tracker, spec: RobotSpec, command: Subgoal) -> tuple[GlobalState, Bool[np.ndarray, " robot"]]:
-    """States after each decision, [decision, robot], and which robots fell."""
-    batch = RobotBatch(spec, len(command.slot))
+def run_robots(
+    spec: RobotSpec, size: int, control_step: Callable[[RobotBatch], None]
+) -> tuple[GlobalState, Bool[np.ndarray, " robot"]]:
+    """States after each decision, [decision, robot], and which robots fell, moved by whatever does a control step."""
+    batch = RobotBatch(spec, size)
     batch.reset(np.random.default_rng(0))
-    states, fell = [], np.zeros(len(command.slot), bool)
+    states, fell = [], np.zeros(size, bool)
     for _ in range(round(SECONDS / DECISION_DT)):
         before = batch.qpos.copy()
         for _ in range(spec.steps_per_decision):
-            follow(TrackerController(tracker), batch, command)
+            control_step(batch)
             fell |= batch.fallen
         states.append(spec.observe(batch.qpos, before))
     return jax.tree.map(lambda *leaves: np.stack(leaves), *states), fell
@@ -82,7 +86,7 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
     stored = {
         "robot": spec.name,
         "control_dt": spec.control_dt,
-        "reach": asdict(tracker.reach),
+        "reach": asdict(reach),
         "observations": actor.observations,
         "actions": actor.actions,
         "hidden": config.sac.hidden,

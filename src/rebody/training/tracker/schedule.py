@@ -1,5 +1,6 @@
 """How long orders and trajectories last: ours, or the thesis' curriculum (6.4.1)."""
 
+import math
 from dataclasses import dataclass
 
 from rebody.training.tracker.config import TrackerConfig
@@ -9,8 +10,8 @@ from rebody.training.tracker.config import TrackerConfig
 class Schedule:
     """What holds at one time of a run; lengths in control steps."""
 
-    trajectory: int | None
-    """After which a robot begins anew in its rest pose; None for never."""
+    trajectory: float
+    """After which a robot begins anew in its rest pose; infinite for never."""
     segment: tuple[int, int]
     """Shortest and longest order."""
     change_when_reached: float
@@ -19,13 +20,18 @@ class Schedule:
 
 REACHED = 0.1
 """Within this an order counts as carried out [m, m/s, rad]."""
-_EASY = Schedule(trajectory=300, segment=(300, 300), change_when_reached=0.0)
-_HARD = Schedule(trajectory=1000, segment=(125, 125), change_when_reached=0.2)
+_EASY = Schedule(trajectory=300.0, segment=(300, 300), change_when_reached=0.0)
+_HARD = Schedule(trajectory=1000.0, segment=(125, 125), change_when_reached=0.2)
 
 
 def schedule(config: TrackerConfig, iteration: int, control_dt: float) -> Schedule:
     """That of an iteration."""
     if config.curriculum_iterations:
         return _EASY if iteration < config.curriculum_iterations else _HARD
-    shortest, longest = (round(seconds / control_dt) for seconds in config.segment_s)
-    return Schedule(None, (shortest, longest), 0.0)
+    return Schedule(math.inf, segment_steps(config, control_dt), 0.0)
+
+
+def segment_steps(config: TrackerConfig, control_dt: float) -> tuple[int, int]:
+    """Shortest and longest order without the curriculum [control steps]."""
+    shortest, longest = config.segment_s
+    return round(shortest / control_dt), round(longest / control_dt)

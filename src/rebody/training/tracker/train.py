@@ -121,8 +121,7 @@ def collect(
             command=command,
         )
         write(state.replay, first_row + step * config.robots, seen)
-        is_old = orders.age >= lasting.trajectory if lasting.trajectory else np.zeros(config.robots, bool)
-        begin_anew(state, batch, batch.fallen | is_old, rng)
+        begin_anew(state, batch, batch.fallen | (orders.age >= lasting.trajectory), rng)
 
 
 @eqx.filter_jit
