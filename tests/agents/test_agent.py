@@ -13,6 +13,7 @@ from rebody.agents.build import AGENTS, build_agent
 from rebody.agents.parts import Inference, inference_template
 from rebody.agents.rollout import begin, decide
 from rebody.bodies.toys import FullToy
+from rebody.control.high_level import policy_observation
 from rebody.errors import RebodyError
 from rebody.inference.contract import Contract
 from rebody.inference.probe import fit_probe
@@ -235,13 +236,15 @@ def standing(stored_config):
         parts,
         replace_fn=lambda w: 30 * w,
     )
+    parts = eqx.tree_at(lambda p: p.probe.families, parts, jnp.array([STAND]))
     return Inference("standing", Contract.from_config(config["contract"]), parts, FullToy(max_torque=6.0))
 
 
 @pytest.mark.parametrize("kind", ["reuse", "readout", "bayes", "oracle", "idle"])
 def test_an_action_has_as_many_numbers_as_the_toy_takes(standing, kind):
     tasks = Task(np.full((1, SIZE), STAND), np.ones((1, SIZE), np.float32))
-    action = say(build_agent(kind, standing, tasks), STATE, BELIEF, FIRST).action
+    _, command = eqx.filter_jit(build_agent(kind, standing, tasks).begin)(STATE)
+    action = command.action
     assert action.shape == (SIZE, 3)
     assert np.isfinite(action).all()
     assert (kind == "idle") == (not np.asarray(action).any())
@@ -250,13 +253,15 @@ def test_an_action_has_as_many_numbers_as_the_toy_takes(standing, kind):
 def test_a_subgoal_to_stand_is_the_pitch_that_the_full_toy_would_have(standing):
     state = replace(STATE, pitch=np.array([0.3, -1.0, 0.0], "f4"), pitch_rate=np.array([1.0, 0.0, -2.0], "f4"))
     command = say(build_agent("reuse", standing, horizon=4), state, BELIEF, FIRST)
-    pitch, turn = np.array(state.pitch), np.array(state.pitch_rate)
+    x, vx, pitch, turn = (np.array(part) for part in (state.x, state.vx, state.pitch, state.pitch_rate))
     said = standing.parts.module.decoder.interpret(BELIEF)
     for _ in range(4):
-        observation = np.concatenate([np.stack([pitch / 10.0, turn / 3.5], axis=-1), said.features()], axis=-1)
-        torque = 6.0 * np.asarray(standing.parts.high_level.actor(observation.astype(np.float32)))[:, 2]
-        turn = turn + 0.1 * (torque - 4.0 * turn - 4.0 * pitch)
-        pitch = pitch + 0.1 * turn
+        here = replace(state, x=x, pitch=pitch, pitch_rate=turn)
+        seen = policy_observation(here, said, ("pitch", "pitch_rate"), (10.0, 3.5), (("x", 9.0), ("pitch", 1.0)))
+        force, _, torque = (np.array([7.0, 0.0, 6.0]) * np.asarray(standing.parts.high_level.actor(seen))).T
+        vx = (vx + 0.1 * (force - 2.0 * vx)).astype("f4")
+        turn = (turn + 0.1 * (torque - 4.0 * turn - 4.0 * pitch)).astype("f4")
+        x, pitch = x + np.float32(0.1) * vx, pitch + np.float32(0.1) * turn
     np.testing.assert_allclose(command.subgoal.value, pitch, atol=1e-5)
     np.testing.assert_array_equal(command.subgoal.slot, [STAND] * SIZE)
 

@@ -119,8 +119,9 @@ def test_a_module_is_loaded_with_its_mixture(kinds, stored_config, tmp_path):
     np.testing.assert_allclose(
         loaded.parts.mixture.responsibilities(latent), parts.mixture.responsibilities(latent), rtol=1e-6
     )
-    believed = 2 if kinds else 5  # a split belief is seen as the share and the reference of the one field
-    assert loaded.parts.high_level.actor(jnp.zeros((1, 2 + 2 * believed))).shape == (1, 3)
+    # a split belief is seen as the share, the distance, the size and the doubt of the one field
+    seen = 4 if kinds else 2 * 5
+    assert loaded.parts.high_level.actor(jnp.zeros((1, 2 + seen))).shape == (1, 3)
 
 
 def test_a_module_of_before_there_were_mixtures_has_none(saved, stored_config):

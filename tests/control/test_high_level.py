@@ -5,7 +5,7 @@ import pytest
 
 from rebody.agents.parts import task_code
 from rebody.control.flat import flat_observation
-from rebody.control.high_level import TaskCode, policy_observation
+from rebody.control.high_level import TaskCode, observation_size, policy_observation
 from rebody.tasks import GOAL, VELOCITY
 from rebody.types import Belief, GlobalState, Task
 
@@ -33,11 +33,36 @@ def test_targets_are_divided_by_the_largest_of_their_family():
     np.testing.assert_allclose(both(Task(np.array(GOAL), np.array(-15.0, np.float32))).mean, [0, 1, 0, -1])
 
 
-def test_policies_see_scaled_fields_then_mean_and_deviation():
+def test_a_policy_sees_scaled_fields_then_mean_and_deviation():
     state = GlobalState(*(np.asarray(i, np.float32) for i in range(8)))
     np.testing.assert_allclose(
         policy_observation(state, BELIEF, ("vx", "x"), (2.0, 7.0)), [2.0, 0.0, 0.5, -1.0, 0.5, 2.0]
     )
+
+
+def test_places_are_seen_from_where_the_body_is():
+    """Two fields, the second likelier: its place as it is, the first's faded by how much less likely it is."""
+    state = GlobalState(*(np.asarray(value, np.float32) for value in (6.0, 0, 0, 0, -1.0, 0, 0, 0)))
+    belief = Belief(np.array([0.2, 0.8, -0.4, 0.5], "f4"), np.array([0.0, 0.0, 0.04, 0.01], "f4"))
+    seen = policy_observation(state, belief, ("vx",), (2.0,), (("x", 10.0), ("vx", 2.0)))
+    faded = np.array([0.25, 1.0])
+    expected = [[-0.5], [0.2, 0.8], faded * [-1.0, 1.0], faded * [0.4, 0.5], faded * [0.2, 0.1]]
+    np.testing.assert_allclose(seen, np.concatenate(expected), rtol=1e-5)
+    assert len(seen) == observation_size(1, 4, (("x", 10.0), ("vx", 2.0)))
+
+
+def test_far_from_home_and_near_it_are_the_same_and_farther_than_far_too():
+    def seen(x, goal):
+        state = GlobalState(*(np.asarray(value, np.float32) for value in (x, 0, 0, 0, 1.0, 0, 0, 0)))
+        told = CODE(Task(np.array(GOAL), np.asarray(goal, np.float32)))
+        return np.asarray(policy_observation(state, told, ("vx",), (3.0,), CODE.places))
+
+    size = 5  # where the magnitude of the goal itself stands: a relative reward depends on it
+    np.testing.assert_allclose(seen(40.0, 35.0)[:size], seen(2.0, -3.0)[:size], rtol=1e-5)
+    np.testing.assert_array_equal(seen(60.0, 10.0), seen(45.0, 10.0))
+
+
+def test_a_flat_policy_sees_joints_then_x_then_the_belief():
     joints = np.array([0.1, -0.2], np.float32)
     np.testing.assert_allclose(
         flat_observation(joints, np.asarray(-5.0, np.float32), BELIEF, 10.0), [0.1, -0.2, -0.5, 0.5, -1.0, 0.5, 2.0]

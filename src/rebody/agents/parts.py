@@ -15,7 +15,7 @@ from rebody.agents.slots import SlotClassifier
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import Toy, make_toy
 from rebody.control.flat import FlatPolicy
-from rebody.control.high_level import HighLevelPolicy, TaskCode
+from rebody.control.high_level import HighLevelPolicy, Places, TaskCode, observation_size
 from rebody.control.sac import Actor, SACConfig
 from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
@@ -100,8 +100,10 @@ def inference_template(config: dict[str, Any]) -> InferenceParts:
     weights = np.zeros((settings.latent + 1, len(ranges)), np.float32)
     return InferenceParts(
         module=InferenceModule(settings, actions, jax.random.key(0)),
-        high_level=_policy_template(settings.interpreted, actions, policy),
-        told_policy=_policy_template(2 * len(ranges), actions, policy),
+        high_level=_policy_template(settings.latent, settings.places, actions, policy),
+        told_policy=_policy_template(
+            2 * len(ranges), task_code(with_tuples(ranges)).places if settings.kinds else (), actions, policy
+        ),
         probe=Probe(np.zeros(len(ranges), np.int32), weights, weights),
         mixture=no_mixture(mixture["maximum"], settings.clustered) if mixture else None,
     )
@@ -187,9 +189,11 @@ def _understood(artifact: Artifact) -> Iterator[None]:
         ) from error
 
 
-def _policy_template(belief_size: int, actions: int, config: dict[str, Any]) -> HighLevelPolicy:
-    actor = _actor_template(len(config["fields"]) + 2 * belief_size, actions, config)
-    return HighLevelPolicy(actor, tuple(config["fields"]), tuple(config["scales"]))
+def _policy_template(believed: int, places: Places, actions: int, config: dict[str, Any]) -> HighLevelPolicy:
+    size = observation_size(len(config["fields"]), believed, places)
+    return HighLevelPolicy(
+        _actor_template(size, actions, config), tuple(config["fields"]), tuple(config["scales"]), places
+    )
 
 
 def _actor_template(observations: int, actions: int, config: dict[str, Any]) -> Actor:

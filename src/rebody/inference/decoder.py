@@ -95,9 +95,7 @@ class Decoder(eqx.Module):
         spread = jnp.einsum("...k,kf->...f", kind.variance, self.choice.weights[0] ** 2)
         share = jax.nn.softmax(self.choice(kind.mean) / jnp.sqrt(1 + jnp.pi / 8 * spread), axis=-1)
         doubt = jnp.einsum("...a,af->...f", amount.variance, self.reference.weights[0] ** 2)
-        # the likeliest field's place as it is: a share of 0.998 would put it 3 cm short of 15 m
-        gate = share / jnp.max(share, axis=-1, keepdims=True)
         return Belief(
-            jnp.concatenate([share, gate * self.reference(amount.mean)], axis=-1),
-            jnp.concatenate([jnp.zeros_like(share), gate**2 * doubt], axis=-1),
+            jnp.concatenate([share, self.reference(amount.mean)], axis=-1),
+            jnp.concatenate([jnp.zeros_like(share), doubt], axis=-1),
         )

@@ -59,9 +59,9 @@ class InferenceConfig:
         return self.kinds or self.latent
 
     @property
-    def interpreted(self) -> int:
-        """Size of a belief as a policy sees it (`Decoder.interpret`)."""
-        return 2 * len(self.fields) if self.kinds else self.latent
+    def places(self) -> tuple[tuple[str, float], ...]:
+        """Fields that a split latent says the places of (`Decoder.interpret`), and their scales; else none."""
+        return tuple(zip(self.fields, self.scales, strict=True)) if self.kinds else ()
 
 
 class InferenceModule(eqx.Module):

@@ -20,7 +20,7 @@ def final_error(task: Task, state: GlobalState, start: float = 0.0) -> Float[np.
     `task` is the last one, [*episode]; `state` that after each decision, [time, *episode]; `start` is x before
     the first [m].
     """
-    judged = [np.asarray(family.achieved(state), float) for family in FAMILIES]
+    judged = [np.asarray(getattr(state, family.field), float) for family in FAMILIES]
     judged[VELOCITY] = _mean_velocity(np.asarray(state.x, float), start)
     last = round(LAST_S / DECISION_DT)
     return np.abs(_of_family(task, judged)[-last:] - task.target).mean(axis=0)
@@ -28,7 +28,7 @@ def final_error(task: Task, state: GlobalState, start: float = 0.0) -> Float[np.
 
 def final_squared_error(task: Task, state: GlobalState) -> Float[np.ndarray, "*episode"]:
     """Squared error at the last decision [m^2, (m/s)^2, rad^2], to compare with ReMAP."""
-    achieved = [np.asarray(family.achieved(state), float)[-1:] for family in FAMILIES]
+    achieved = [np.asarray(getattr(state, family.field), float)[-1:] for family in FAMILIES]
     return (_of_family(task, achieved)[-1] - task.target) ** 2
 
 

@@ -20,10 +20,12 @@ def preset(request):
 
 def test_encoder_and_policy_see_what_moves(preset):
     inference = preset.inference
-    for fields, scales in ((inference.fields, inference.scales), (preset.policy_fields, preset.policy_scales)):
+    places = {field for field, _ in inference.places}
+    for fields, scales in ((inference.fields, inference.scales), preset.policy_view):
         assert set(fields) <= MOVES[preset.toy]
         assert len(fields) == len(scales)
-        assert {SHOWN_BY[family] for family in preset.target_ranges} <= set(fields)
+        assert {SHOWN_BY[family] for family in preset.target_ranges} <= {*fields, *places}
+    assert len(preset.told_places) == (len(preset.target_ranges) if places else 0)
 
 
 def test_tasks_can_be_done_by_the_toy(preset):

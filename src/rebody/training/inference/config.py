@@ -3,7 +3,9 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from rebody.agents.parts import task_code
 from rebody.bodies.toys import Randomisation
+from rebody.control.high_level import Places
 from rebody.control.sac import SACConfig
 from rebody.inference import InferenceConfig
 from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
@@ -85,6 +87,16 @@ class MetaConfig:
     """Updates of encoder and decoder in an iteration."""
     policy_updates: int = 512
     """Updates of the policy in an iteration, and of the policy that is told the task in joint ones."""
+
+    @property
+    def policy_view(self) -> tuple[tuple[str, ...], tuple[float, ...]]:
+        """Fields of the global state that the policies see, and their scales."""
+        return self.policy_fields, self.policy_scales
+
+    @property
+    def told_places(self) -> Places:
+        """What the policy that is told its task sees the places of."""
+        return task_code(self.target_ranges).places if self.inference.places else ()
 
     @property
     def target_ranges(self) -> dict[str, tuple[float, float]]:

@@ -67,7 +67,7 @@ def collect(
         task, key = inputs
         body, seen, carry, belief, held = walk
         action_key, step_key, noise_key, wander_key = jax.random.split(key, 4)
-        observation = policy_observation(seen, interpret(belief), config.policy_fields, config.policy_scales)
+        observation = policy_observation(seen, interpret(belief), *config.policy_view, config.inference.places)
         sampled, _ = actor.sample(observation, action_key)
         held = _wander(held, config.turn_probability, wander_key)
         action = jnp.where(roles.decides[:, None], actor(observation), sampled)

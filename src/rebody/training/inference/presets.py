@@ -74,8 +74,8 @@ def goal_velocity() -> MetaConfig:
         prior="mixture",
         arrival=0.05,
         arrival_width=0.02,
-        policy_fields=("x", "vx"),
-        policy_scales=(10.0, 3.0),
+        policy_fields=("vx",),
+        policy_scales=(3.0,),
         start=(15.0, 3.0),
         turn_probability=0.08,
         switch_share=0.5,
@@ -94,7 +94,6 @@ def goal_velocity_thesis() -> MetaConfig:
         base,
         tasks=TaskDistribution((*_both_ways("goal", 1.0, 25.0), *_both_ways("velocity", 0.5, 3.0))),
         inference=replace(base.inference, scales=(15.0, 3.0)),
-        policy_scales=(15.0, 3.0),
         start=(25.0, 3.0),
     )
 
@@ -122,8 +121,8 @@ def goal_velocity_stand() -> MetaConfig:
         tasks=TaskDistribution((*base.tasks.base_tasks, *_both_ways("stand", pi / 6, pi / 2))),
         toy="full",
         inference=replace(base.inference, fields=("x", "vx", "pitch"), scales=(10.0, 3.0, 1.5), latent=8, kinds=3),
-        policy_fields=("x", "vx", "pitch", "pitch_rate"),
-        policy_scales=(10.0, 3.0, 1.5, 3.0),
+        policy_fields=("vx", "pitch", "pitch_rate"),
+        policy_scales=(3.0, 1.5, 3.0),
     )
 
 

@@ -17,7 +17,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from rebody.agents.parts import InferenceParts, load_inference, task_code
 from rebody.bodies.toys import Toy, make_toy
 from rebody.control import sac
-from rebody.control.high_level import HighLevelPolicy, policy_observation
+from rebody.control.high_level import HighLevelPolicy, Places, observation_size, policy_observation
 from rebody.control.sac import SACBatch, SACState
 from rebody.errors import RebodyError
 from rebody.inference.mixture.padded import Clusters, clusters_of, no_clusters
@@ -96,10 +96,12 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
         if iteration < config.inference_iterations:
             replay = refresh_beliefs(module.encoder, replay)
             # it acts in no episode itself: later ones, of a policy that hardly explores, would lead it astray
-            told, told_metrics = update_policy(told, tell(replay, config), stored, config, keys[2])
+            told_replay = tell(replay, config)
+            told, told_metrics = update_policy(told, told_replay, stored, config, config.told_places, keys[2])
             metrics |= {f"told/{name}": value for name, value in told_metrics.items()}
         interpreted = eqx.tree_at(lambda e: e.belief, replay, module.decoder.interpret(replay.belief))
-        policy, policy_metrics = update_policy(policy, interpreted, stored, config, keys[2])
+        places = config.inference.places
+        policy, policy_metrics = update_policy(policy, interpreted, stored, config, places, keys[2])
         metrics |= policy_metrics
     state = RunState(module, optimiser, policy, told, clusters, replay, state.iteration + 1)
     if (iteration + 1) % EVALUATE_EVERY == 0:
@@ -119,9 +121,10 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
     module = InferenceModule(config.inference, toy.actions, module_key)
-    observations, families = len(config.policy_fields), len(config.tasks.families)
-    policy = sac.initial_state(observations + 2 * config.inference.interpreted, toy.actions, config.sac, sac_key)
-    told = sac.initial_state(observations + 2 * 2 * families, toy.actions, config.sac, sac_key)
+    fields, inference = len(config.policy_fields), config.inference
+    seen = observation_size(fields, inference.latent, inference.places)
+    seen_told = observation_size(fields, 2 * len(config.tasks.families), config.told_places)
+    policy, told = (sac.initial_state(size, toy.actions, config.sac, sac_key) for size in (seen, seen_told))
     clusters = no_clusters(config.mixture.maximum, config.inference.clustered)
     if init_from is not None:
         parts = load_inference(init_from).parts
@@ -151,8 +154,8 @@ def _take_over(trained: InferenceModule, fresh: InferenceModule, name: str) -> I
 def trained_parts(state: RunState, config: MetaConfig) -> InferenceParts:
     """What is kept of a run, its probe not yet fitted."""
     by_belief, by_task = (
-        HighLevelPolicy(policy.averaged_actor, config.policy_fields, config.policy_scales)
-        for policy in (state.sac, state.told)
+        HighLevelPolicy(policy.averaged_actor, *config.policy_view, places)
+        for policy, places in ((state.sac, config.inference.places), (state.told, config.told_places))
     )
     unfitted = jnp.zeros((config.inference.latent + 1, len(config.tasks.families)))
     probe = Probe(jnp.asarray(config.tasks.families), unfitted, unfitted)
@@ -199,12 +202,12 @@ def update_inference(
 
 @eqx.filter_jit
 def update_policy(
-    policy: SACState, replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray
+    policy: SACState, replay: Episodes, stored, config: MetaConfig, places: Places, key: PRNGKeyArray
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """Steps of soft actor-critic on nominal episodes, with the beliefs held then as the policy sees them."""
 
     def batch_of(_: None, key: PRNGKeyArray) -> SACBatch:
-        return sample_transitions(replay, stored, config, key)
+        return sample_transitions(replay, stored, config, places, key)
 
     return sac.update_many(policy, batch_of, None, jax.random.split(key, config.policy_updates), config.sac)
 
@@ -241,7 +244,7 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
     )
 
 
-def sample_transitions(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray) -> SACBatch:
+def sample_transitions(replay: Episodes, stored, config: MetaConfig, places: Places, key: PRNGKeyArray) -> SACBatch:
     """Decisions of nominal episodes, with the beliefs before and after."""
     group_key, episode_key, time_key = jax.random.split(key, 3)
     size = (config.sac.batch_size,)
@@ -251,7 +254,7 @@ def sample_transitions(replay: Episodes, stored, config: MetaConfig, key: PRNGKe
 
     def observation(time):
         state, belief = jax.tree.map(lambda leaf: leaf[group, episode, time], (replay.state, replay.belief))
-        return policy_observation(state, belief, config.policy_fields, config.policy_scales)
+        return policy_observation(state, belief, *config.policy_view, places)
 
     return SACBatch(
         observation=observation(time),
