@@ -222,7 +222,7 @@ def standing(stored_config):
         "inference": {
             "units": 8,
             "window": None,
-            "latent": 2,
+            "latent": 3,
             "kinds": 1,
             "fields": ("x", "pitch"),
             "scales": (9.0, 1.0),

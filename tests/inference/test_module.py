@@ -10,9 +10,10 @@ import optax
 import pytest
 import scipy.stats
 
+from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig, InferenceModule
 from rebody.inference.decoder import Decoder, Prediction
-from rebody.inference.module import BASE_TASKS, Evidence, loss
+from rebody.inference.module import BASE_TASKS, FARTHEST_PLACE, Evidence, loss
 from rebody.inference.prior import SplitPrior, unit_gaussian
 from rebody.types import Belief, GlobalState, Transition
 
@@ -140,32 +141,41 @@ def test_dynamics_do_not_shape_the_latent_and_rewards_do(decoder):
 def test_reward_is_a_weighted_distance_from_a_point_linear_in_the_latent(decoder):
     rng = np.random.default_rng(0)
     latent, state = rng.normal(size=(4, 3)).astype("f4"), rng.normal(size=(4, 2)).astype("f4")
-    reference = latent @ decoder.reference.weights[0] + decoder.reference.biases[0]
-    weights = jnp.log1p(jnp.exp(decoder.weights(latent)))
+    (expert,) = decoder.experts
+    reference = latent @ expert.reference.weights[0] + expert.reference.biases[0]
+    weights = jnp.log1p(jnp.exp(expert.weights(latent)))
     expected = -(weights * jnp.abs(state - reference)).sum(axis=-1)
     np.testing.assert_allclose(decoder.reward(state, latent).expectation, expected, rtol=1e-5)
     np.testing.assert_allclose(decoder.reward(reference, latent).expectation, np.zeros(4), atol=1e-6)
-    assert len(decoder.reference.weights) == 1
+    assert len(expert.reference.weights) == 1
 
 
 @pytest.fixture(scope="module")
 def split_decoder():
-    """Of a latent whose first two dimensions say what kind of task it is, and two how much is asked."""
-    return eqx.filter_jit(Decoder)(3, 1, 4, 2, 8, key=jax.random.key(0))
+    """Of a latent whose first two dimensions say what kind of task it is, and two for each field how much is asked."""
+    return eqx.filter_jit(Decoder)(3, 1, 8, 2, 8, key=jax.random.key(0))
+
+
+def of_experts(decoder, state, amount):
+    """What each expert says, by its own field and its own part of the amounts, [point, expert]."""
+    said = []
+    for i, expert in enumerate(decoder.experts):
+        own = amount[:, 2 * i : 2 * i + 2]
+        weight = jnp.log1p(jnp.exp(expert.weights(own)))
+        said.append(-weight * jnp.abs(state[:, i : i + 1] - expert.reference(own)))
+    return jnp.concatenate(said, axis=-1)
 
 
 def points(fields, size=6):
     rng = np.random.default_rng(0)
-    return rng.normal(size=(size, 4)).astype("f4"), rng.normal(size=(size, fields)).astype("f4")
+    return rng.normal(size=(size, 8)).astype("f4"), rng.normal(size=(size, fields)).astype("f4")
 
 
 def test_kinds_choose_among_the_fields_and_amounts_say_the_rest(split_decoder):
     latent, state = points(3)
     kind, amount = latent[:, :2], latent[:, 2:]
     choice = jax.nn.softmax(split_decoder.choice(kind), axis=-1)
-    weight = jnp.log1p(jnp.exp(split_decoder.weights(amount)))
-    expected = -(weight * choice * jnp.abs(state - split_decoder.reference(amount))).sum(axis=-1)
-    assert weight.shape == (6, 1)
+    expected = (choice * of_experts(split_decoder, state, amount)).sum(axis=-1)
     np.testing.assert_allclose(split_decoder.reward(state, latent).expectation, expected, rtol=1e-5)
 
 
@@ -193,10 +203,10 @@ def test_amounts_have_no_part_in_the_choice(split_decoder):
         return slope / slope.sum(axis=-1, keepdims=True), slope.sum(axis=-1)
 
     one, size = shares(latent)
-    two, other_size = shares(latent + np.array([0.0, 0.0, 0.7, -0.4], "f4"))
+    two, other_size = shares(latent + np.array([0.0, 0.0, *6 * [0.7]], "f4"))
     np.testing.assert_allclose(one, two, rtol=1e-4)
     assert np.abs(size - other_size).min() > 1e-4
-    assert np.abs(one - shares(latent + np.array([0.7, 0.0, 0.0, 0.0], "f4"))[0]).max() > 1e-2
+    assert np.abs(one - shares(latent + np.array([0.7, *7 * [0.0]], "f4"))[0]).max() > 1e-2
 
 
 def test_the_split_prior_is_the_weighted_sum_of_both():
@@ -359,10 +369,9 @@ def test_likelihood_of_a_prediction(experts):
 
 
 def test_experts_do_not_blend(split_decoder):
-    """Each is paid for its own field alone, whatever the kinds say."""
+    """Each is paid for its own field alone, by its own amounts, whatever the kinds say."""
     latent, state = points(3)
-    weight = jnp.log1p(jnp.exp(split_decoder.weights(latent[:, 2:])))
-    expected = -weight * jnp.abs(state - split_decoder.reference(latent[:, 2:]))
+    expected = of_experts(split_decoder, state, latent[:, 2:])
     np.testing.assert_allclose(split_decoder.reward(state, latent).mean, expected, rtol=1e-5)
 
 
@@ -373,7 +382,7 @@ def test_a_sure_belief_is_interpreted_as_its_field_and_the_reference(split_decod
     share, place = np.split(np.asarray(said.mean), 2, axis=-1)
     chosen = np.argmax(sure.choice(latent[:, :2]), axis=-1)
     np.testing.assert_allclose(share, np.eye(3)[chosen], atol=1e-4)
-    reference = np.asarray(sure.reference(latent[:, 2:]))
+    reference = np.asarray(sure.places(latent[:, 2:]))
     np.testing.assert_allclose(place, reference, atol=1e-3)
     assert np.asarray(said.variance).max() < 1e-6
 
@@ -386,10 +395,31 @@ def test_doubt_is_interpreted_as_draws_would_be(split_decoder):
     draws = latent + np.sqrt(variance) * rng.standard_normal((20_000, *latent.shape)).astype("f4")
     share = np.asarray(jax.nn.softmax(split_decoder.choice(draws[..., :2]), axis=-1)).mean(axis=0)
     np.testing.assert_allclose(said.mean[:, :3], share, atol=0.02)
-    spread = np.asarray(split_decoder.reference(draws[..., 2:])).var(axis=0)
+    spread = np.asarray(split_decoder.places(draws[..., 2:])).var(axis=0)
     np.testing.assert_allclose(said.variance[:, 3:], spread, rtol=0.05)
 
 
 def test_a_belief_that_is_not_split_says_what_it_says(decoder):
     belief = Belief(np.ones((2, 3), "f4"), np.ones((2, 3), "f4"))
     assert decoder.interpret(belief) is belief
+
+
+def test_fields_share_the_amounts_of_a_split_latent_evenly():
+    uneven = InferenceConfig(fields=("x", "vx"), scales=(1.0, 1.0), latent=5, kinds=2)
+    with pytest.raises(RebodyError, match="leaves 3, which 2 fields cannot share"):
+        InferenceModule(uneven, 1, jax.random.key(0))
+
+
+def test_places_beyond_what_a_body_visits_cost(evidence, monkeypatch):
+    """An account of any task by a place far away, from where all distances are alike, does not pay."""
+    config = replace(CONFIG, kinds=1, latent=2)
+    module = InferenceModule(config, 1, jax.random.key(0))
+    module = eqx.tree_at(
+        lambda m: (m.decoder.experts[0].reference.weights[0], m.decoder.experts[0].reference.biases[0]),
+        module,
+        (jnp.zeros((1, 1)), jnp.full(1, -4.0)),
+    )
+    held = float(loss(module, evidence, unit_gaussian, config, jax.random.key(1))[0])
+    monkeypatch.setattr("rebody.inference.module.FARTHEST_PLACE", 4.0)
+    free = float(loss(module, evidence, unit_gaussian, config, jax.random.key(1))[0])
+    assert held - free == pytest.approx((4.0 - FARTHEST_PLACE) ** 2, rel=1e-4)

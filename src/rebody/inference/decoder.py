@@ -3,7 +3,7 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float, PRNGKeyArray
+from jaxtyping import Float, Key, PRNGKeyArray
 
 from rebody.inference.prior import split
 from rebody.nn import MLP
@@ -28,6 +28,24 @@ class Prediction(eqx.Module):
         return jax.nn.logsumexp(self.log_share - 0.5 * squared, axis=-1) - 0.5 * self.log_variance
 
 
+class Expert(eqx.Module):
+    """Reads a reward as a weighted distance of some fields from a point that is linear in an amount."""
+
+    reference: MLP
+    weights: MLP
+
+    def __init__(self, fields: int, amounts: int, units: int, *, keys: Key[AnyArray, "2"]):
+        self.reference = MLP(amounts, fields, (), key=keys[0])
+        self.weights = MLP(amounts, fields, (units,), key=keys[1])
+
+    def __call__(
+        self, state: Float[AnyArray, "*batch field"], amount: Float[AnyArray, "*batch amount"]
+    ) -> Float[AnyArray, "*batch"]:
+        """The expected reward, in units of the reward scale."""
+        costs = jax.nn.softplus(self.weights(amount)) * jnp.abs(state - self.reference(amount))
+        return -jnp.sum(costs, axis=-1)
+
+
 class Decoder(eqx.Module):
     """p(next state, reward | state, action, z) = p(next state | state, action, z) p(reward | next state, z).
 
@@ -41,23 +59,25 @@ class Decoder(eqx.Module):
 
     Where z is split, its first dimensions say *what* is to be brought there, the others *how much*. Each field has an
     expert that is paid for that field alone, and *what* says how likely each is the one. Their rewards are not added
-    up: a blend of two fields would pay, early on, where one field is all there is to it, and get stuck there.
+    up: a blend of two fields would pay, early on, where one field is all there is to it, and get stuck there. Nor do
+    experts share what says how much: one that has explained tasks of another kind would keep theirs from being right.
     """
 
     state_head: MLP
-    reference: MLP
-    weights: MLP
+    experts: tuple[Expert, ...]
     log_variance: MLP
     choice: MLP | None
     kinds: int = eqx.field(static=True)
 
     def __init__(self, fields: int, actions: int, latent: int, kinds: int, units: int, *, key: PRNGKeyArray):
         keys = jax.random.split(key, 4)
-        amounts = latent - kinds
         self.kinds = kinds
         self.state_head = MLP(fields + actions + latent, fields, (units, units), key=keys[0])
-        self.reference = MLP(amounts, fields, (), key=keys[1])
-        self.weights = MLP(amounts, 1 if kinds else fields, (units,), key=keys[2])
+        experts = fields if kinds else 1
+        expert_keys = jax.vmap(jax.random.split)(jax.random.split(keys[1], experts)) if kinds else keys[None, 1:3]
+        self.experts = tuple(
+            Expert(fields // experts, (latent - kinds) // experts, units, keys=two) for two in expert_keys
+        )
         self.log_variance = MLP(fields + latent, 1, (units, units), key=keys[3])
         self.choice = MLP(kinds, fields, (), key=jax.random.fold_in(key, 4)) if kinds else None
 
@@ -76,8 +96,8 @@ class Decoder(eqx.Module):
     ) -> Prediction:
         """The reward's prediction, in units of the reward scale; one expert where z is not split."""
         kind, amount = latent[..., : self.kinds], latent[..., self.kinds :]
-        costs = jax.nn.softplus(self.weights(amount)) * jnp.abs(next_state - self.reference(amount))
-        mean = -costs if self.kinds else -jnp.sum(costs, axis=-1, keepdims=True)
+        of_each = zip(self.experts, self._split(next_state), self._split(amount), strict=True)
+        mean = jnp.stack([expert(state, own) for expert, state, own in of_each], axis=-1)
         log_share = jax.nn.log_softmax(self.choice(kind), axis=-1) if self.choice else jnp.zeros_like(mean)
         log_variance = self.log_variance(jnp.concatenate([next_state, latent], axis=-1))[..., 0]
         return Prediction(mean, log_share, jnp.clip(log_variance, -12.0, 4.0))
@@ -94,8 +114,18 @@ class Decoder(eqx.Module):
         # what a softmax of a Gaussian is on average (MacKay 1992)
         spread = jnp.einsum("...k,kf->...f", kind.variance, self.choice.weights[0] ** 2)
         share = jax.nn.softmax(self.choice(kind.mean) / jnp.sqrt(1 + jnp.pi / 8 * spread), axis=-1)
-        doubt = jnp.einsum("...a,af->...f", amount.variance, self.reference.weights[0] ** 2)
+        variances = zip(self.experts, self._split(amount.variance), strict=True)
+        doubt = [variance @ expert.reference.weights[0] ** 2 for expert, variance in variances]
         return Belief(
-            jnp.concatenate([share, self.reference(amount.mean)], axis=-1),
-            jnp.concatenate([jnp.zeros_like(share), doubt], axis=-1),
+            jnp.concatenate([share, self.places(amount.mean)], axis=-1),
+            jnp.concatenate([jnp.zeros_like(share), *doubt], axis=-1),
         )
+
+    def places(self, amount: Float[AnyArray, "*batch amount"]) -> Float[AnyArray, "*batch field"]:
+        """Where each field would be brought, scaled as the encoder's."""
+        of_each = zip(self.experts, self._split(amount), strict=True)
+        return jnp.concatenate([expert.reference(own) for expert, own in of_each], axis=-1)
+
+    def _split(self, features: Float[AnyArray, "*batch feature"]) -> list[Float[AnyArray, "*batch own"]]:
+        """What each expert sees of them."""
+        return jnp.split(features, len(self.experts), axis=-1)

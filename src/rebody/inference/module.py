@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import optax
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
+from rebody.errors import RebodyError
 from rebody.inference.decoder import Decoder
 from rebody.inference.encoder import Encoder
 from rebody.inference.prior import Prior
@@ -17,6 +18,9 @@ from rebody.types import AnyArray, GlobalState, Transition
 
 BASE_TASKS = 2 * len(FAMILIES)
 """Family x sign."""
+FARTHEST_PLACE = 1.5
+"""Experts are held to places within this, in units of their fields' scales. Beyond all that a body visits a distance is
+next to constant: a cheap account of any task, which keeps an expert from ever finding the true place."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,15 @@ class InferenceModule(eqx.Module):
     """Latent -> logits of the base tasks, where labels are used."""
 
     def __init__(self, config: InferenceConfig, actions: int, key: PRNGKeyArray):
-        """`actions`: size of the toy's action, which only the decoder sees."""
+        """`actions`: size of the toy's action, which only the decoder sees.
+
+        RebodyError if a split latent has not as many amounts for each field.
+        """
+        if config.kinds and (config.latent - config.kinds) % len(config.fields):
+            raise RebodyError(
+                f"a latent of {config.latent} with {config.kinds} for the kind leaves {config.latent - config.kinds}, "
+                f"which {len(config.fields)} fields cannot share evenly. Choose another --inference.latent."
+            )
         encoder_key, decoder_key = jax.random.split(key)
         label_key = jax.random.fold_in(key, 2)
         self.encoder = Encoder(
@@ -127,6 +139,9 @@ def loss(
     reward_error = jnp.sum(share * (wanted - predicted.expectation) ** 2)
 
     reconstruction = reward_loss + config.state_weight * state_error
+    if config.kinds:
+        excess = jnp.maximum(jnp.abs(decoder.places(latent[..., config.kinds :])) - FARTHEST_PLACE, 0.0)
+        reconstruction = reconstruction + jnp.mean(excess**2)
     if module.labeller is not None:
         labels = optax.softmax_cross_entropy_with_integer_labels(module.labeller(latent), evidence.base_task)
         reconstruction = reconstruction + config.label_weight * jnp.mean(labels)

@@ -244,7 +244,7 @@ def test_inference_is_frozen_while_the_policy_learns_on(pipelines, tmp_path, mon
 
     assert [int(state.iteration) for state in states] == list(range(9))
     assert changed(lambda state: state.module.encoder) == [True, True, True, False, False]
-    assert changed(lambda state: state.module.decoder.reference) == [True, True, True, False, False]
+    assert changed(lambda state: state.module.decoder.experts) == [True, True, True, False, False]
     assert changed(lambda state: state.sac.actor) == [False, True, True, True, True]
     assert changed(lambda state: state.told.actor) == [False, True, True, False, False]
     assert changed(lambda state: state.clusters) == [False, True, True, False, False]

@@ -68,7 +68,7 @@ def goal_velocity() -> MetaConfig:
             projections=16,
             discount=0.95,
             learning_rate=5e-4,
-            decay_updates=105_000,
+            decay_updates=61_000,
             huber=0.05,
         ),
         prior="mixture",
@@ -80,10 +80,10 @@ def goal_velocity() -> MetaConfig:
         turn_probability=0.08,
         switch_share=0.5,
         episodes=96,
-        wander_iterations=40,
-        joint_iterations=100,
+        wander_iterations=25,
+        joint_iterations=95,
         policy_iterations=0,
-        policy_updates=1024,
+        policy_updates=640,
     )
 
 
@@ -93,7 +93,7 @@ def goal_velocity_thesis() -> MetaConfig:
     return replace(
         base,
         tasks=TaskDistribution((*_both_ways("goal", 1.0, 25.0), *_both_ways("velocity", 0.5, 3.0))),
-        inference=replace(base.inference, scales=(15.0, 3.0)),
+        inference=replace(base.inference, scales=(17.0, 3.0)),
         start=(25.0, 3.0),
     )
 
@@ -120,7 +120,7 @@ def goal_velocity_stand() -> MetaConfig:
         base,
         tasks=TaskDistribution((*base.tasks.base_tasks, *_both_ways("stand", pi / 6, pi / 2))),
         toy="full",
-        inference=replace(base.inference, fields=("x", "vx", "pitch"), scales=(10.0, 3.0, 1.5), latent=8, kinds=3),
+        inference=replace(base.inference, fields=("x", "vx", "pitch"), scales=(10.0, 3.0, 1.5), latent=9, kinds=3),
         policy_fields=("vx", "pitch", "pitch_rate"),
         policy_scales=(3.0, 1.5, 3.0),
     )
