@@ -1,5 +1,7 @@
 """The decoder: (state, action, latent) -> (next state, reward), used in training only."""
 
+from collections.abc import Sequence
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -126,6 +128,6 @@ class Decoder(eqx.Module):
         of_each = zip(self.experts, self._split(amount), strict=True)
         return jnp.concatenate([expert.reference(own) for expert, own in of_each], axis=-1)
 
-    def _split(self, features: Float[AnyArray, "*batch feature"]) -> list[Float[AnyArray, "*batch own"]]:
+    def _split(self, features: Float[AnyArray, "*batch feature"]) -> Sequence[Float[AnyArray, "*batch own"]]:
         """What each expert sees of them."""
         return jnp.split(features, len(self.experts), axis=-1)
