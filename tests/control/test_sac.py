@@ -37,15 +37,15 @@ def train(data, key):
     return jax.lax.scan(one, initial_state(1, 1, CONFIG, keys[0]), keys[1:])
 
 
-def trained(observation, reward, next_observation=0.0, discount=0.0, seed=0):
+def trained(observation, reward, next_observation=0.0, terminal=1.0, seed=0):
     """The state after training on random actions; `reward` may be a function of the action."""
     action = jax.random.uniform(jax.random.key(9), (SIZE, 1), minval=-1.0, maxval=1.0)
-    observation, next_observation, discount = (
+    observation, next_observation, terminal = (
         jnp.broadcast_to(jnp.asarray(value, jnp.float32), (SIZE,))
-        for value in (observation, next_observation, discount)
+        for value in (observation, next_observation, terminal)
     )
     reward = jnp.broadcast_to(jnp.asarray(reward(observation, action[:, 0])), (SIZE,))
-    data = SACBatch(observation[:, None], action, reward, next_observation[:, None], discount)
+    data = SACBatch(observation[:, None], action, reward, next_observation[:, None], terminal)
     return train(data, jax.random.key(seed))[0]
 
 
@@ -83,19 +83,14 @@ def test_value_depends_on_the_observation():
 
 def test_discounting_over_two_steps():
     """0 -> 1 without a reward, 1 -> end with a reward of 1."""
-    state = trained(
-        ALTERNATE,
-        lambda observation, action: observation,
-        next_observation=1.0,
-        discount=CONFIG.discount * (1 - ALTERNATE),
-    )
+    state = trained(ALTERNATE, lambda observation, action: observation, next_observation=1.0, terminal=ALTERNATE)
     np.testing.assert_allclose(values(state, 1.0), 1.0, atol=0.05)
     np.testing.assert_allclose(values(state, 0.0), CONFIG.discount, atol=0.05)
 
 
 def test_value_of_a_reward_for_ever():
     """1 / (1 - discount) = 10."""
-    state = trained(0.0, lambda observation, action: 1.0, discount=CONFIG.discount)
+    state = trained(0.0, lambda observation, action: 1.0, terminal=0.0)
     np.testing.assert_allclose(values(state, 0.0), 10.0, rtol=0.05)
 
 
@@ -127,7 +122,7 @@ def small_batch():
         action=jnp.stack([wave[::-1]], axis=-1),
         reward=wave + 0.5,
         next_observation=jnp.stack([wave**2, wave], axis=-1),
-        discount=jnp.where(wave > 0.9, 0.0, 0.98),
+        terminal=(wave > 0.9).astype(jnp.float32),
     )
 
 

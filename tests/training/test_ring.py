@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rebody.training.ring import draw, draw_runs, write
+from rebody.training.ring import draw, write
 
 SIZE = 7
 
@@ -46,14 +46,3 @@ def test_a_seed_decides_what_is_drawn(ring):
     one, same, other = (draw(ring, SIZE, (20,), np.random.default_rng(seed))["number"] for seed in (0, 0, 1))
     np.testing.assert_array_equal(one, same)
     assert (one != other).any()
-
-
-def test_runs_are_rows_that_come_after_one_another(ring):
-    for written in range(0, 12, 2):
-        write(ring, written, rows(written, 2))
-    drawn = draw_runs(ring, 12, (200,), 2, 3, np.random.default_rng(0))
-    assert drawn["twice"].shape == (200, 3, 2)
-    first = drawn["number"][:, 0]
-    assert set(first) == set(range(5, 12))
-    known = first[:, None] + [0, 2, 4]
-    np.testing.assert_array_equal(drawn["number"], np.where(known < 12, known, known - SIZE))

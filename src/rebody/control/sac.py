@@ -53,13 +53,13 @@ class SACConfig:
 
 
 class SACBatch(eqx.Module):
-    """Transitions of one step or of several, their rewards added up."""
+    """Transitions; `terminal` is 1 where the episode truly ended (no value beyond)."""
 
     observation: Float[AnyArray, "batch observation"]
     action: Float[AnyArray, "batch action"]  # in [-1, 1]
     reward: Float[AnyArray, " batch"]
     next_observation: Float[AnyArray, "batch observation"]
-    discount: Float[AnyArray, " batch"]  # of the value beyond: 0 where the episode truly ended
+    terminal: Float[AnyArray, " batch"]
 
 
 class Network(eqx.Module):
@@ -210,7 +210,7 @@ def _update_critics(state, batch, key, config):
     next_action, next_log_prob = state.actor.sample(batch.next_observation, key)
     next_value = state.target_critics(batch.next_observation, next_action).min(0)
     next_value = next_value - jnp.exp(state.log_temperature) * next_log_prob
-    target = batch.reward + batch.discount * next_value
+    target = batch.reward + config.discount * (1 - batch.terminal) * next_value
 
     def loss(critics):
         values = critics(batch.observation, batch.action)

@@ -17,17 +17,6 @@ def newest(ring: Tree, written: int, rows: int) -> Tree:
     return jax.tree.map(lambda leaf: leaf[(written - rows + np.arange(rows)) % len(leaf)], ring)
 
 
-def draw_runs(
-    ring: Tree, written: int, shape: tuple[int, ...], apart: int, length: int, rng: np.random.Generator
-) -> Tree:
-    """Drawn rows and those that come `apart` rows after one another behind them, [*shape, length]; beyond the newest
-    row a run goes on with the oldest ones, or with rows that were never written."""
-    size = len(jax.tree.leaves(ring)[0])
-    first = rng.integers(min(size, written), size=(*shape, 1))
-    rows = (first + apart * np.arange(length)) % size
-    return jax.tree.map(lambda leaf: leaf[rows], ring)
-
-
 def draw(ring: Tree, written: int, shape: tuple[int, ...], rng: np.random.Generator) -> Tree:
     """Rows drawn evenly with replacement, of which `written` were ever written."""
     size = len(jax.tree.leaves(ring)[0])

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 
-from rebody.control.tracker import MARGIN, Command, Motion, after, tracker_observation, tracker_reward
+from rebody.control.tracker import MARGIN, Command, Motion
 from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.training.tracker import train
 from rebody.training.tracker.train import Replay, collect, initial_state, relabel
@@ -92,11 +92,6 @@ def test_what_has_fallen_starts_anew_with_a_new_order(batch, config):
     assert batch.lying_s[1] == 0
 
 
-def learned_from(transitions, key, config):
-    """Each transition by itself."""
-    return relabel(jax.tree.map(lambda leaf: leaf[:, None], transitions), key, replace(config, n_step=1), CONTROL_DT)
-
-
 @pytest.fixture
 def relabelled(config):
     """(transitions, what is learned from them), most of them short of every limit."""
@@ -115,7 +110,7 @@ def relabelled(config):
             rng.integers(GOAL, VELOCITY + 1, size).astype(np.int32), rng.uniform(-3, 3, size).astype(np.float32)
         ),
     )
-    return transitions, learned_from(transitions, jax.random.key(2), config)
+    return transitions, relabel(transitions, jax.random.key(2), config, CONTROL_DT)
 
 
 def told(observation, config):
@@ -141,7 +136,7 @@ def test_everything_but_the_command_is_as_it_was(relabelled):
     np.testing.assert_array_equal(batch.observation[:, :17], transitions.joints)
     np.testing.assert_array_equal(batch.next_observation[:, :17], transitions.next_joints)
     np.testing.assert_array_equal(batch.action, transitions.action)
-    np.testing.assert_allclose(batch.discount, 0.98 * ~transitions.motion.fell)
+    np.testing.assert_array_equal(batch.terminal, transitions.motion.fell)
 
 
 def test_the_reward_is_what_the_command_would_have_brought(relabelled, config):
@@ -166,7 +161,7 @@ def test_afterwards_a_goal_is_nearer_and_a_speed_the_same(relabelled, config):
 
 def test_relabelling_can_be_turned_off(relabelled, config):
     transitions, _ = relabelled
-    batch = learned_from(transitions, jax.random.key(2), replace(config, relabelled=0.0))
+    batch = relabel(transitions, jax.random.key(2), replace(config, relabelled=0.0), CONTROL_DT)
     is_goal, value = told(batch.observation, config)
     np.testing.assert_array_equal(is_goal, transitions.command.slot == GOAL)
     np.testing.assert_allclose(value, transitions.command.value, rtol=1e-5)
@@ -183,8 +178,8 @@ def test_a_fall_ends_what_is_learned_and_nothing_else_does(batch, config, counte
     assert np.flatnonzero(seen.motion.fell).tolist() == [1]
     assert np.abs(seen.next_joints[1, 1]) > 2.5  # its pitch: what is learned is how it lay
     assert np.abs(seen.joints[1 + config.robots, 1]) < 0.2  # and then it stood again
-    learned = learned_from(seen, jax.random.key(0), config)
-    assert np.flatnonzero(learned.discount == 0).tolist() == [1]
+    learned = relabel(seen, jax.random.key(0), config, CONTROL_DT)
+    assert np.flatnonzero(learned.terminal).tolist() == [1]
 
 
 def test_pushes_come_as_often_and_are_as_large_as_the_settings_say(batch, config):
@@ -214,7 +209,7 @@ def test_a_push_is_seen_before_the_robot_acts(batch, config, counted):
 def test_under_a_new_command_a_wanted_pitch_stays_in_the_world(relabelled, config):
     transitions, _ = relabelled
     standing = replace(config, relabelled=1.0, reach=replace(config.reach, pitch=(-0.5, 1.0)))
-    batch = learned_from(transitions, jax.random.key(2), standing)
+    batch = relabel(transitions, jax.random.key(2), standing, CONTROL_DT)
     stands, turn, later = (np.asarray(o) for o in (batch.observation[:, 19] == 1, *pitches(batch)))
     assert np.mean(stands) == pytest.approx(1 / 3, abs=0.1)
     assert not turn[~stands].any()
@@ -237,32 +232,7 @@ def test_its_own_command_to_stand_is_kept(relabelled, config):
     transitions, _ = relabelled
     told = replace(transitions.command, slot=np.full(400, STAND, np.int32))
     standing = replace(config, relabelled=0.0, reach=replace(config.reach, pitch=(-0.5, 1.0)))
-    batch = learned_from(replace(transitions, command=told), jax.random.key(2), standing)
+    batch = relabel(replace(transitions, command=told), jax.random.key(2), standing, CONTROL_DT)
     turn, later = pitches(batch)
     np.testing.assert_array_equal(turn, told.value)
     np.testing.assert_allclose(later, told.value - transitions.motion.turn, atol=1e-6)
-
-
-def test_rewards_of_several_steps_are_added_up_until_the_run_breaks(relabelled, config):
-    """Of three runs one goes on to the end, one ends with a fall after two steps, one is broken after the first."""
-    transitions, _ = relabelled
-    rows = np.arange(9).reshape(3, 3)
-    runs = jax.tree.map(lambda leaf: leaf[rows].copy(), transitions)
-    runs.motion.fell[:] = [[False, False, False], [False, True, False], [False, False, False]]
-    for step in (1, 2):
-        runs.joints[:, step] = runs.next_joints[:, step - 1]
-    runs.joints[2, 1, 4] += 1e-3  # pushed
-    several = replace(config, relabelled=0.0, n_step=3)
-    batch = relabel(runs, jax.random.key(0), several, CONTROL_DT)
-    for run, (length, ends) in enumerate([(3, False), (2, True), (1, False)]):
-        alone = jax.tree.map(lambda leaf, run=run: leaf[run : run + 1], runs)
-        told, reward = jax.tree.map(lambda leaf: leaf[:, 0], alone.command), 0.0
-        for step in range(length):
-            motion, action = jax.tree.map(lambda leaf, step=step: leaf[:, step], (alone.motion, alone.action))
-            paid = tracker_reward(told, motion, CONTROL_DT, action, config.reach, config.reward)
-            reward += 0.98**step * float(paid[0])
-            told = after(told, motion)
-        assert float(batch.reward[run]) == pytest.approx(reward, rel=1e-4)
-        assert float(batch.discount[run]) == pytest.approx(0.0 if ends else 0.98**length)
-        last = tracker_observation(alone.next_joints[:, length - 1], told, config.reach)
-        np.testing.assert_allclose(batch.next_observation[run], last[0], rtol=1e-5)

@@ -190,8 +190,8 @@ def learn(
     """One update of soft actor-critic per batch."""
 
     def batch_of(seen: Replay, _: PRNGKeyArray) -> SACBatch:
-        discount = jnp.full_like(seen.reward, config.sac.discount)
-        return SACBatch(seen.observation, seen.action, seen.reward, seen.next_observation, discount)
+        alive = jnp.zeros_like(seen.reward)
+        return SACBatch(seen.observation, seen.action, seen.reward, seen.next_observation, alive)
 
     return sac.update_many(policy, batch_of, transitions, jax.random.split(key, config.updates), config.sac)
 

@@ -261,7 +261,7 @@ def sample_transitions(replay: Episodes, stored, config: MetaConfig, places: Pla
         action=replay.action[group, episode, time],
         reward=_shaped(replay.reward[group, episode, time], config),
         next_observation=observation(time + 1),
-        discount=jnp.full(size, config.sac.discount),
+        terminal=jnp.zeros(size),
     )
 
 

@@ -24,8 +24,6 @@ class TrackerConfig:
     """Length of the run."""
     replay: int = 500_000
     """Transitions kept."""
-    n_step: int = 3
-    """Control steps whose rewards are added up before the critic takes over."""
     relabelled: float = 0.5
     """Share of a batch whose commands are drawn anew."""
     segment_s: tuple[float, float] = (1.0, 8.0)

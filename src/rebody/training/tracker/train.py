@@ -5,7 +5,6 @@ given, since the reward of any command follows from how the robot moved.
 """
 
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 
 import equinox as eqx
@@ -20,7 +19,7 @@ from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.tracker import Command, Motion, Tracker, after, tracker_observation, tracker_reward
 from rebody.training.motion import motion_of
-from rebody.training.ring import draw_runs, newest, write
+from rebody.training.ring import draw, newest, write
 from rebody.training.run import Metrics, Run
 from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.orders import Orders, commands, follow_guides, no_orders, renew
@@ -83,9 +82,8 @@ def iterate(state: RunState, batch: RobotBatch, config: TrackerConfig, seed: int
     collect_key, learn_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration))
     collect(state, batch, config, rng, collect_key)
     written = (iteration + 1) * config.steps * config.robots
-    shape = (config.updates, config.sac.batch_size)
-    runs = draw_runs(state.replay, written, shape, config.robots, config.n_step, rng)
-    policy, metrics = learn(state.sac, runs, learn_key, config, batch.spec.control_dt)
+    transitions = draw(state.replay, written, (config.updates, config.sac.batch_size), rng)
+    policy, metrics = learn(state.sac, transitions, learn_key, config, batch.spec.control_dt)
     metrics |= experience(newest(state.replay, written, config.steps * config.robots), config, batch.spec.control_dt)
     state = eqx.tree_at(
         lambda s: (s.sac, s.physics, s.lying_s, s.iteration),
@@ -150,45 +148,32 @@ def begin_anew(state: RunState, batch: RobotBatch, who: Bool[np.ndarray, " robot
 
 @eqx.filter_jit
 def learn(
-    policy: SACState, runs: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float
+    policy: SACState, transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """One update of soft actor-critic per batch."""
 
-    def batch_of(runs: Replay, key: PRNGKeyArray) -> SACBatch:
-        return relabel(runs, key, config, control_dt)
+    def batch_of(transitions: Replay, key: PRNGKeyArray) -> SACBatch:
+        return relabel(transitions, key, config, control_dt)
 
-    return sac.update_many(policy, batch_of, runs, jax.random.split(key, config.updates), config.sac)
+    return sac.update_many(policy, batch_of, transitions, jax.random.split(key, config.updates), config.sac)
 
 
-def relabel(runs: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float) -> SACBatch:
-    """Runs of transitions [batch, step] with their first command or a new one, and the rewards that it would have
-    brought, added up (n-step returns; Sutton and Barto, chapter 7).
+def relabel(transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float) -> SACBatch:
+    """Transitions with their own command or a new one, and the reward that it would have brought.
 
-    A command is taken to last: afterwards the same goal in the world is nearer, a speed is the same. A run ends where
-    the robot fell or was pushed, begins anew, or is not known any further.
+    A command is taken to last: afterwards the same goal in the world is nearer, a speed is the same.
     """
-    first, reach = jax.tree.map(lambda leaf: leaf[:, 0], runs), config.reach
-    size = len(first.action)
-    fresh = config.commands.sample(key, first.motion.pitch - first.motion.turn, reach)
+    motion, action, reach = transitions.motion, transitions.action, config.reach
+    size = len(motion.pitch)
+    fresh = config.commands.sample(key, motion.pitch - motion.turn, reach)
     renewed = jnp.arange(size) < config.relabelled * size
-    command = jax.tree.map(lambda new, old: jnp.where(renewed, new, old), fresh, first.command)
-    told, goes_on = command, jnp.ones(size, bool)
-    discount, reward = jnp.ones(size), jnp.zeros(size)
-    joints = first.joints
-    for step in range(config.n_step):
-        now = jax.tree.map(lambda leaf, step=step: leaf[:, step], runs)
-        goes_on &= jnp.all(now.joints == joints, axis=-1) & (discount > 0)
-        earned = tracker_reward(told, now.motion, control_dt, now.action, reach, config.reward)
-        reward += jnp.where(goes_on, discount * earned, 0.0)
-        discount *= jnp.where(goes_on, config.sac.discount * ~now.motion.fell, 1.0)
-        told = jax.tree.map(partial(jnp.where, goes_on), after(told, now.motion), told)
-        joints = jnp.where(goes_on[:, None], now.next_joints, joints)
+    command = jax.tree.map(lambda new, old: jnp.where(renewed, new, old), fresh, transitions.command)
     return SACBatch(
-        observation=tracker_observation(first.joints, command, reach),
-        action=first.action,
-        reward=reward,
-        next_observation=tracker_observation(joints, told, reach),
-        discount=discount,
+        observation=tracker_observation(transitions.joints, command, reach),
+        action=action,
+        reward=tracker_reward(command, motion, control_dt, action, reach, config.reward),
+        next_observation=tracker_observation(transitions.next_joints, after(command, motion), reach),
+        terminal=motion.fell.astype(jnp.float32),
     )
 
 
