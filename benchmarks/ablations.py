@@ -15,14 +15,14 @@ from pathlib import Path
 
 from inference import figures_of, show
 
-BUDGET = "--wander-iterations 15 --joint-iterations 25 --sac.decay-updates 26000"
+BUDGET = "--wander-iterations 15 --joint-iterations 25 --sac.decay-updates 16000"
 CALM = "--randomisation.ripple-amplitude 0 --randomisation.lag 0 --randomisation.gain 1 1"
 VARIANTS = {
     "as shipped": "",
     "labelled": "--inference.label-weight 0.05",
     "one Gaussian": "--prior gaussian",
     "fixed K = 4": "--mixture.components 4",
-    "latent not split": "--inference.kinds 0",
+    "latent not split": "--inference.kinds 0 --policy-fields x vx --policy-scales 10 3",
     "window 16": "--inference.window 16",
     "window 64": "--inference.window 64",
     "carried state": "--inference.window None --inference.batch-size 8",
