@@ -22,7 +22,7 @@ VARIANTS = {
     "labelled": "--inference.label-weight 0.05",
     "one Gaussian": "--prior gaussian",
     "fixed K = 4": "--mixture.components 4",
-    "latent not split": "--inference.kinds 0 --policy-fields x vx --policy-scales 10 3",
+    "latent not split": "--inference.kinds 0",
     "window 16": "--inference.window 16",
     "window 64": "--inference.window 64",
     "carried state": "--inference.window None --inference.batch-size 8",

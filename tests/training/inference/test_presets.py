@@ -1,5 +1,7 @@
 """Presets hang together: what is asked can be seen, reached, and held by the toy."""
 
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
@@ -56,3 +58,11 @@ def test_noise_takes_the_place_of_all_disturbances(name, variance):
     for part in ("ripple_amplitude", "pitch_ripple", "lag", "gain", "state_noise"):
         np.testing.assert_array_equal(getattr(drawn, part), getattr(nominal, part))
     assert noisy.tasks == PRESETS["goal-velocity"]().tasks
+
+
+def test_a_policy_without_places_sees_what_the_encoder_sees():
+    whole = PRESETS["goal-velocity"]()
+    assert whole.policy_view == (("vx",), (3.0,))
+    unsplit = replace(whole, inference=replace(whole.inference, kinds=0))
+    assert unsplit.policy_view == (("x", "vx"), (10.0, 3.0))
+    assert PRESETS["position"]().policy_view == (("x", "vx"), (10.0, 3.5))

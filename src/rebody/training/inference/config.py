@@ -46,7 +46,7 @@ class MetaConfig:
     sac: SACConfig
     """The high-level policy's learning."""
     policy_fields: tuple[str, ...]
-    """Fields of the global state that the policies see."""
+    """Fields of the global state that the policies see, beside the places that a split latent speaks of."""
     policy_scales: tuple[float, ...]
     """What each of them is divided by [m, m/s]."""
     prior: Literal["gaussian", "mixture"] = "gaussian"
@@ -90,8 +90,14 @@ class MetaConfig:
 
     @property
     def policy_view(self) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """Fields of the global state that the policies see, and their scales."""
-        return self.policy_fields, self.policy_scales
+        """Fields of the global state that the policies see, and their scales.
+
+        Where the latent is not split no place is seen as a distance, so they see what the encoder sees as it is, too.
+        """
+        scales = dict(zip(self.policy_fields, self.policy_scales, strict=True))
+        if not self.inference.places:
+            scales = dict(zip(self.inference.fields, self.inference.scales, strict=True)) | scales
+        return tuple(scales), tuple(scales.values())
 
     @property
     def told_places(self) -> Places:

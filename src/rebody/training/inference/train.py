@@ -121,7 +121,7 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
     module = InferenceModule(config.inference, toy.actions, module_key)
-    fields, inference = len(config.policy_fields), config.inference
+    fields, inference = len(config.policy_view[0]), config.inference
     seen = observation_size(fields, inference.latent, inference.places)
     seen_told = observation_size(fields, 2 * len(config.tasks.families), config.told_places)
     policy, told = (sac.initial_state(size, toy.actions, config.sac, sac_key) for size in (seen, seen_told))
