@@ -252,9 +252,10 @@ def test_an_action_has_as_many_numbers_as_the_toy_takes(standing, kind):
 
 def test_a_subgoal_to_stand_is_the_pitch_that_the_full_toy_would_have(standing):
     state = replace(STATE, pitch=np.array([0.3, -1.0, 0.0], "f4"), pitch_rate=np.array([1.0, 0.0, -2.0], "f4"))
-    command = say(build_agent("reuse", standing, horizon=4), state, BELIEF, FIRST)
+    belief = jax.tree.map(lambda part: np.concatenate([part, part[:, :1]], axis=-1), BELIEF)  # three dimensions
+    command = say(build_agent("reuse", standing, horizon=4), state, belief, FIRST)
     x, vx, pitch, turn = (np.array(part) for part in (state.x, state.vx, state.pitch, state.pitch_rate))
-    said = standing.parts.module.decoder.interpret(BELIEF)
+    said = standing.parts.module.decoder.interpret(belief)
     for _ in range(4):
         here = replace(state, x=x, pitch=pitch, pitch_rate=turn)
         seen = policy_observation(here, said, ("pitch", "pitch_rate"), (10.0, 3.5), (("x", 9.0), ("pitch", 1.0)))
