@@ -73,7 +73,7 @@ def errors(predict: Predict) -> dict[str, float]:
 
     def control_step(batch: RobotBatch) -> None:
         x, pitch = (where.astype(np.float32) for where in (batch.x, SPEC.pitch(batch.qpos)))
-        batch.step(predict(np.asarray(_observe(SPEC.joint_state(batch.qpos, batch.qvel), subgoal, x, pitch))))
+        batch.step(predict(np.asarray(_observe(batch.joint_state(), subgoal, x, pitch))))
 
     states, _ = run_robots(SPEC, len(slot), control_step)
     found = final_error(Task(slot, subgoal.value), states)

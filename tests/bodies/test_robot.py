@@ -35,6 +35,11 @@ def roll(batch, actions):
     return np.stack(history)
 
 
+@pytest.fixture(scope="module")
+def walker():
+    return load_robot("walker")
+
+
 @pytest.mark.parametrize(
     ("name", "theirs"), [("cheetah", "HalfCheetah-v5"), ("hopper", "Hopper-v5"), ("walker", "Walker2d-v5")]
 )
@@ -47,7 +52,7 @@ def test_moves_bit_for_bit_as_gymnasiums(name, theirs, tmp_path, monkeypatch):
     kind = mujoco.mjtState.mjSTATE_INTEGRATION
     state = np.zeros(mujoco.mj_stateSize(env.model, kind))
     mujoco.mj_getState(env.model, env.data, state, kind)
-    batch.state = state[None]
+    batch.state = np.array([[*state, 0.0, 0.0]])  # it has not lain, and stood
     for action in actions_of(1, actuators=spec.model.nu):
         env.step(action[0])
         batch.step(action)
@@ -109,8 +114,36 @@ def test_joint_state_does_not_know_where_it_is_nor_how_often_it_turned(cheetah):
     rng = np.random.default_rng(0)
     qpos, qvel = rng.normal(size=(2, 9)), rng.normal(size=(2, 9))
     moved = qpos + np.array([5.0, 0, 2 * np.pi, 0, 0, 0, 0, 0, 0])
-    assert cheetah.joint_state(qpos, qvel).shape == (2, 17)
-    np.testing.assert_allclose(cheetah.joint_state(moved, qvel), cheetah.joint_state(qpos, qvel), atol=1e-5)
+    seen, pace = cheetah.joint_state(qpos, qvel, np.zeros(2)), np.ones(2)
+    assert seen.shape == (2, 17)
+    np.testing.assert_allclose(cheetah.joint_state(moved, qvel, pace), seen, atol=1e-5)
+
+
+def test_pace_is_the_speed_of_a_control_step_or_its_mean_over_the_last_ones(cheetah, walker):
+    assert cheetah.next_pace(np.array(5.0), np.array(0.1)) == pytest.approx(0.1 / cheetah.control_dt)
+    pace, steps = np.zeros(1), round(walker.smoothing_s / walker.control_dt)
+    for i in range(5 * steps):
+        speed = 1.0 + 0.5 * np.sin(2 * np.pi * i / (steps / 2))  # a gait with a period of half the time constant
+        pace = walker.next_pace(pace, np.array([speed * walker.control_dt]))
+        if i == steps - 1:
+            assert pace == pytest.approx(1 - np.exp(-1), abs=0.12)
+    assert pace == pytest.approx(1.0, abs=0.12)
+
+
+def test_a_batch_knows_its_pace(walker):
+    """It comes last in the joint state, begins anew with a robot, and is restored with the state."""
+    batch, twin = batch_of(walker, 3), batch_of(walker, 3)
+    batch.push(np.array([1.0, 0.0, -1.0]))
+    batch.step(np.zeros((3, 6)))
+    assert (np.sign(batch.pace) == np.sign(batch.x)).all()
+    np.testing.assert_allclose(batch.pace, batch.x / walker.smoothing_s)
+    np.testing.assert_array_equal(batch.joint_state()[:, -1], batch.pace.astype(np.float32))
+    twin.state = batch.state
+    for robots in (batch, twin):
+        robots.step(np.ones((3, 6)))
+    np.testing.assert_array_equal(twin.joint_state(), batch.joint_state())
+    batch.reset(np.random.default_rng(0), np.array([True, False, False]))
+    np.testing.assert_array_equal(batch.pace, [0.0, *twin.pace[1:]])
 
 
 def test_lies_on_its_back_only(cheetah):
@@ -222,4 +255,4 @@ def test_an_ant_reads_out_relative_to_its_rest_pose():
     batch.qpos[:] = spec.model.qpos0
     state = spec.observe(batch.qpos + np.eye(1, spec.model.nq, 1) * 0.2, batch.qpos)
     np.testing.assert_allclose([state.x, state.z, state.vz], np.outer([0.0, 0.2, 2.0], [1, 1]), atol=1e-6)
-    assert spec.joint_state(batch.qpos, batch.qvel).shape == (2, 2 + 8 + 3 + 8)
+    assert batch.joint_state().shape == (2, 2 + 8 + 3 + 8)

@@ -38,19 +38,22 @@ def command(slot, value):
     return Command(np.full(value.shape, slot), value)
 
 
-def motion(displacement, turn=0.0, pitch=0.0, fell=False):
+def motion(displacement, turn=0.0, pitch=0.0, pace=None, fell=False):
+    """Steady ones, unless a pace is given [m/s]."""
     displacement = np.asarray(displacement, np.float32)
-    turn, pitch = (np.full_like(displacement, value) for value in (turn, pitch))
-    return Motion(displacement, turn, pitch, np.full(displacement.shape, fell))
+    pace = displacement / CONTROL_DT if pace is None else pace
+    turn, pitch, pace = (np.full_like(displacement, value) for value in (turn, pitch, pace))
+    return Motion(displacement, turn, pitch, pace, np.full(displacement.shape, fell))
 
 
-def pay(slot, value, displacement, pitch=0.0, action=0.0, control_dt=CONTROL_DT):
+def pay(slot, value, displacement, pitch=0.0, action=0.0, control_dt=CONTROL_DT, pace=None):
     """Reward of each of several displacements [m]."""
     displacement = np.asarray(displacement, np.float32)
+    pace = displacement / control_dt if pace is None else pace
     return np.asarray(
         tracker_reward(
             command(slot, np.full_like(displacement, value)),
-            motion(displacement, pitch=pitch),
+            motion(displacement, pitch=pitch, pace=pace),
             control_dt,
             np.full((*displacement.shape, 6), action, np.float32),
             REACH,
@@ -170,7 +173,7 @@ def test_reward_of_a_pitch_peaks_on_it_however_far_the_robot_lies():
     told, action = command(STAND, np.full_like(turns, 0.2)), np.zeros((101, 6), np.float32)
     still = np.zeros_like(turns)
     for pitch in (0.0, 1.0):
-        moved = Motion(still, turns, still + pitch, still > 0)
+        moved = Motion(still, turns, still + pitch, still, still > 0)
         paid = np.asarray(tracker_reward(told, moved, CONTROL_DT, action, STANDS, TrackerReward()))
         assert turns[paid.argmax()] == pytest.approx(0.2, abs=1e-6)
         assert paid.max() == pytest.approx(TrackerReward().arrival, abs=1e-5)
@@ -203,3 +206,9 @@ def test_relative_errors_make_it_walk(slot, value):
 
 def test_a_fall_costs_what_being_on_its_feet_pays():
     assert pay_walker(VELOCITY, 1.0, 1.0) - pay_walker(VELOCITY, 1.0, 1.0, fell=True) == pytest.approx(0.5)
+
+
+def test_a_speed_is_paid_by_the_pace_and_not_by_every_step():
+    steps = CONTROL_DT * np.array([0.0, 1.0, 2.0], np.float32)
+    np.testing.assert_array_equal(np.ptp(pay(VELOCITY, 1.0, steps, pace=1.0)), 0.0)
+    assert pay(VELOCITY, 1.0, steps, pace=1.0)[0] > pay(VELOCITY, 1.0, steps, pace=0.8)[0]

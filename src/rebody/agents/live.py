@@ -38,7 +38,7 @@ class LiveAgent:
 
     def reset(self) -> None:
         """Forget everything: a new episode begins with the next step."""
-        self._steps = 0
+        self._steps, self._pace = 0, np.zeros(())
 
     def step(self, observation: Float[np.ndarray, " observation"], reward: float) -> Float[np.ndarray, " action"]:
         """Joint action in [-1, 1] for one control step.
@@ -53,11 +53,14 @@ class LiveAgent:
                 f"got shape {np.shape(observation)}."
             )
         qpos, qvel = np.split(np.asarray(observation, float), [model.nq])
+        x = np.asarray(qpos[self._spec.root_addresses[0]])
+        if self._steps:
+            self._pace = self._spec.next_pace(self._pace, np.asarray(x - self._last_x))
         if self._steps % self._spec.steps_per_decision == 0:
             self._decide(qpos, reward)
-        self._steps += 1
-        x = np.asarray(qpos[self._spec.root_addresses[0]], np.float32)
-        pitch, joints = np.asarray(self._spec.pitch(qpos), np.float32), self._spec.joint_state(qpos, qvel)
+        self._steps, self._last_x = self._steps + 1, x
+        pitch, joints = self._spec.pitch(qpos), self._spec.joint_state(qpos, qvel, self._pace)
+        x, pitch = np.asarray(x, np.float32), np.asarray(pitch, np.float32)
         return np.asarray(joint_action(self._controller, joints, x, pitch, self._command.subgoal, self._carry.belief))
 
     @property

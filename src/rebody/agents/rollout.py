@@ -99,7 +99,7 @@ def rollout_on_robot(
 
 def follow(controller: Controller, batch: RobotBatch, subgoal: Subgoal, belief: Belief | None = None) -> None:
     """One control step of every robot."""
-    joints = batch.spec.joint_state(batch.qpos, batch.qvel)
+    joints = batch.joint_state()
     x, pitch = (where.astype(np.float32) for where in (batch.x, batch.spec.pitch(batch.qpos)))
     batch.step(np.asarray(joint_action(controller, joints, x, pitch, subgoal, belief)))
 

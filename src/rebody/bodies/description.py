@@ -43,6 +43,7 @@ class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     fall: _Fall
     reach: _Reach
     reset_noise: float = 0.01
+    smoothing_s: float = 0.0
 
 
 def shipped_robots() -> tuple[str, ...]:
@@ -79,6 +80,7 @@ def _read(path: Path) -> RobotSpec:
         frame_skip=description.frame_skip,
         root=_root(description.root, path),
         reset_noise=description.reset_noise,
+        smoothing_s=description.smoothing_s,
         fall=Fall(**msgspec.structs.asdict(description.fall)),
         reach=Reach(**msgspec.structs.asdict(description.reach)),
     )
@@ -109,6 +111,8 @@ def _check_values(spec: RobotSpec, path: Path) -> None:
         problems.append("frame_skip must be at least 1")
     if not spec.reset_noise >= 0:
         problems.append("reset_noise must not be negative")
+    if not spec.smoothing_s >= 0:
+        problems.append("smoothing_s must not be negative")
     if not spec.fall.max_pitch > 0 or not spec.fall.lasts_s >= 0:
         problems.append("[fall] max_pitch must be positive, lasts_s not negative")
     low, high = spec.reach.speed

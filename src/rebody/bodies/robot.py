@@ -76,6 +76,9 @@ class RobotSpec:
     """When it counts as fallen."""
     reach: Reach
     """What its tracker is trained for."""
+    smoothing_s: float = 0.0
+    """Time constant of the pace, the mean speed that a tracker sees and is paid by [s]; 0 for the speed of a step. A
+    robot that hops or walks moves unevenly: paid by every step, it does best by going slower than it is told."""
     moving_fields: tuple[str, ...] = ("x", "z", "pitch", "vx", "vz", "pitch_rate")
     """Fields of the global state that this body can move."""
 
@@ -146,13 +149,24 @@ class RobotSpec:
             vx=vx, vy=still, vz=vz, pitch_rate=pitch_rate,
         )  # fmt: skip
 
-    def joint_state(self, qpos: Floats, qvel: Floats) -> Float[np.ndarray, "... joint"]:
-        """What a tracker sees of the body: positions without x, pitch wrapped, velocities of like size."""
+    def next_pace(self, pace: Floats, moved: Floats) -> Floats:
+        """The pace [m/s] after a control step by `moved` [m]."""
+        share = min(1.0, self.control_dt / self.smoothing_s) if self.smoothing_s else 1.0
+        return np.asarray(pace + share * (moved / self.control_dt - pace))
+
+    def joint_state(self, qpos: Floats, qvel: Floats, pace: Floats) -> Float[np.ndarray, "... joint"]:
+        """What a tracker sees of the body: positions without x, pitch wrapped, velocities of like size.
+
+        The pace comes last where it is more than the speed that stands among the velocities.
+        """
         x, _, pitch = self.root_addresses
         positions = qpos.astype(np.float32)
         positions[..., pitch] = wrap_angle(positions[..., pitch])
         velocities = (qvel * self._velocity_scale).astype(np.float32)
-        return np.concatenate([np.delete(positions, x, axis=-1), velocities], axis=-1)
+        seen = [np.delete(positions, x, axis=-1), velocities]
+        if self.smoothing_s:
+            seen.append(np.asarray(pace, np.float32)[..., None])
+        return np.concatenate(seen, axis=-1)
 
     @cached_property
     def _velocity_scale(self) -> Floats:
@@ -210,6 +224,8 @@ class RobotBatch:
         self._ctrl = self._batch.bind("ctrl")
         self.lying_s: Float[np.ndarray, " robot"] = np.zeros(size)
         """Seconds that each robot has lain on the ground without a break."""
+        self.pace: Float[np.ndarray, " robot"] = np.zeros(size)
+        """Mean speed of each robot over the last moments [m/s], see `RobotSpec.smoothing_s`."""
 
     @property
     def x(self) -> Float[np.ndarray, " robot"]:
@@ -233,10 +249,11 @@ class RobotBatch:
         self.qpos[ids] = qpos
         self.qvel[ids] = noise * rng.standard_normal((ids.size, model.nv))
         self.lying_s[ids] = 0.0
+        self.pace[ids] = 0.0
 
     def step(self, actions: Float[np.ndarray, "robot nu"]) -> None:
         """One control step with joint actions in [-1, 1]; RebodyError if a simulation diverged."""
-        low, high = self.spec.model.actuator_ctrlrange.T
+        before, (low, high) = self.x, self.spec.model.actuator_ctrlrange.T
         # centre and half-width, so that an action in a range of [-1, 1] arrives without rounding
         self._ctrl[:] = 0.5 * (low + high) + 0.5 * (high - low) * np.clip(actions, -1.0, 1.0)
         self._batch.step(nstep=self.spec.frame_skip)
@@ -246,17 +263,23 @@ class RobotBatch:
                 "or lower the model's time step."
             )
         self.lying_s[:] = np.where(self.spec.lies(self.qpos), self.lying_s + self.spec.control_dt, 0.0)
+        self.pace[:] = self.spec.next_pace(self.pace, self.x - before)
 
     def push(self, change: Float[np.ndarray, " robot"]) -> None:
         """Change the speed of each robot's every part along x [m/s]."""
         self.qvel[:, self.spec.x_velocity_address] += change
 
+    def joint_state(self) -> Float[np.ndarray, "robot joint"]:
+        """What a tracker sees of each robot."""
+        return self.spec.joint_state(self.qpos, self.qvel, self.pace)
+
     @property
     def state(self) -> Float[np.ndarray, "robot state"]:
-        """A copy of mjSTATE_INTEGRATION of every robot, from which stepping continues bit-exactly."""
-        return self._batch.state.copy()
+        """A copy of all that stepping continues from bit-exactly: mjSTATE_INTEGRATION, `lying_s` and `pace`."""
+        return np.column_stack([self._batch.state, self.lying_s, self.pace])
 
     @state.setter
     def state(self, value: Float[np.ndarray, "robot state"]) -> None:
-        self._batch.state[:] = value
+        self._batch.state[:] = value[:, :-2]
+        self.lying_s[:], self.pace[:] = value[:, -2:].T
         self._batch.warning[:] = 0

@@ -32,6 +32,7 @@ class Motion(eqx.Module):
     displacement: Float[AnyArray, "*batch"]  # m
     turn: Float[AnyArray, "*batch"]  # rad
     pitch: Float[AnyArray, "*batch"]  # rad, afterwards
+    pace: Float[AnyArray, "*batch"]  # m/s, afterwards: the speed of this step, or a mean over the last ones
     fell: Bool[AnyArray, "*batch"]
 
 
@@ -123,17 +124,18 @@ def tracker_reward(
     arrival.
     """
     left = after(command, motion).value
-    miss, velocity = jnp.abs(left), motion.displacement / control_dt
+    miss = jnp.abs(left)
     is_goal, is_stand = command.slot == GOAL, command.slot == STAND
     arrival = weights.arrival * 0.1 / (0.1 + miss)
     if weights.relative:
         slowest, fastest = reach.speed
         wanted = jnp.where(is_goal, jnp.clip(1.5 * left, slowest, fastest), command.value)
-        relative_error = jnp.abs(wanted - velocity) / jnp.maximum(jnp.abs(wanted), 0.5)
+        speed = jnp.where(is_goal, motion.displacement / control_dt, motion.pace)
+        relative_error = jnp.abs(wanted - speed) / jnp.maximum(jnp.abs(wanted), 0.5)
         moving = weights.relative * jnp.maximum(1 - relative_error, -0.5) + jnp.where(is_goal, arrival, 0.0)
     else:
         goal = arrival - weights.distance * miss
-        moving = jnp.where(is_goal, goal, -weights.speed * jnp.abs(command.value - velocity))
+        moving = jnp.where(is_goal, goal, -weights.speed * jnp.abs(command.value - motion.pace))
     stand = arrival - weights.turn * miss
     posture = jnp.where(is_stand, 0.0, weights.upright * (1 - jnp.cos(motion.pitch)))
     posture = posture + weights.energy * jnp.mean(action**2, axis=-1)

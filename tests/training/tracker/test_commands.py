@@ -47,6 +47,12 @@ def test_near_goals_are_as_likely_at_every_scale(drawn):
         assert share == pytest.approx(0.8 * (0.3 / 2 + 0.7 * 9 * low / 4.0), abs=ROUGHLY)
 
 
+def test_a_narrower_range_of_speeds_leaves_the_rest_as_it_is():
+    distribution, key, reach = CommandDistribution(), jax.random.key(0), Reach(speed=(-1.0, 3.0), distance=4.0)
+    full, half = (distribution.sample(key, jnp.zeros(DRAWN), reach, share) for share in (1.0, 0.5))
+    np.testing.assert_allclose(half.value, np.where(half.slot == VELOCITY, 0.5, 1.0) * full.value, rtol=1e-6)
+
+
 def test_speeds_are_uniform(drawn):
     speeds = np.sort(drawn[1][drawn[1] != 0])
     expected = np.linspace(-2.0, 2.0, len(speeds))

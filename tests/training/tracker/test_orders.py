@@ -10,7 +10,7 @@ from rebody.control.tracker import MARGIN
 from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.training.tracker.commands import ToyGuide
 from rebody.training.tracker.orders import commands, follow_guides, no_orders, renew
-from rebody.training.tracker.schedule import schedule
+from rebody.training.tracker.schedule import NARROWEST, schedule
 from rebody.types import Task
 
 
@@ -145,3 +145,10 @@ def test_an_order_that_is_carried_out_makes_room_for_another(batch, config):
     before = orders.value.copy()
     renew(orders, batch, config, lasting, np.random.default_rng(0), jax.random.key(0))
     np.testing.assert_array_equal(orders.value != before, [True, False, True])
+
+
+def test_the_range_of_speeds_widens_and_stays_wide(config, batch):
+    widening = replace(config, widening_iterations=100)
+    shares = [schedule(widening, i, batch.spec.control_dt).speed_share for i in (0, 50, 100, 500)]
+    assert shares == pytest.approx([NARROWEST, (1 + NARROWEST) / 2, 1.0, 1.0])
+    assert schedule(config, 0, batch.spec.control_dt).speed_share == 1.0

@@ -61,7 +61,7 @@ def test_rows_of_the_ring_belong_together(batch, config, counted):
                 ring.command.value[here] - ring.motion.displacement[here], ring.command.value[after], atol=1e-5
             )
     last = (seen - config.robots + np.arange(config.robots)) % config.replay
-    np.testing.assert_array_equal(ring.next_joints[last], batch.spec.joint_state(batch.qpos, batch.qvel))
+    np.testing.assert_array_equal(ring.next_joints[last], batch.joint_state())
     np.testing.assert_allclose(ring.motion.pitch[last], batch.spec.pitch(batch.qpos), rtol=1e-6)
     for number in range(seen - config.replay, seen):
         moved[number % config.robots] += ring.motion.displacement[number % config.replay]
@@ -104,6 +104,7 @@ def relabelled(config):
             displacement=rng.normal(0, 0.1, size).astype(np.float32),
             turn=rng.normal(0, 0.1, size).astype(np.float32),
             pitch=rng.uniform(-3, 3, size).astype(np.float32),
+            pace=rng.normal(0, 2, size).astype(np.float32),
             fell=rng.random(size) < 0.1,
         ),
         command=Command(
@@ -144,7 +145,7 @@ def test_the_reward_is_what_the_command_would_have_brought(relabelled, config):
     is_goal, value = told(batch.observation, config)
     miss = np.abs(value - transitions.motion.displacement)
     goal = 0.5 * 0.1 / (0.1 + miss) - 0.2 * miss
-    velocity = -0.4 * np.abs(value - transitions.motion.displacement / CONTROL_DT)
+    velocity = -0.4 * np.abs(value - transitions.motion.pace)
     posture = -0.5 * (1 - np.cos(transitions.motion.pitch)) - 0.02 * np.mean(transitions.action**2, axis=1)
     np.testing.assert_allclose(batch.reward, np.where(is_goal, goal, velocity) + posture, rtol=1e-4, atol=1e-5)
 

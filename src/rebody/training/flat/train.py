@@ -58,7 +58,6 @@ class RunState(eqx.Module):
     minds: Minds
     physics: Float[np.ndarray, "robot state"]
     previous_qpos: Float[np.ndarray, "robot nq"]  # at the last decision
-    lying_s: Float[np.ndarray, " robot"]
     iteration: Int[np.ndarray, ""]
 
 
@@ -85,7 +84,7 @@ def train_flat(
     batch = RobotBatch(spec, config.robots)
     batch.reset(np.random.default_rng((seed, 1)))
     state = run.restore(initial_state(config, batch, module, jax.random.key(seed), init_from))
-    batch.state, batch.lying_s[:] = state.physics, state.lying_s
+    batch.state = state.physics
     state = run.loop(state, lambda state: iterate(state, batch, module, config, seed), config.iterations, "flat")
     return save_flat(flat_policy(state, module), module, spec, config, run, seed)
 
@@ -102,9 +101,9 @@ def iterate(
     transitions = draw(state.replay, stored, (config.updates, config.sac.batch_size), rng)
     policy, metrics = learn(state.sac, transitions, learn_key, config)
     state = eqx.tree_at(
-        lambda s: (s.sac, s.minds, s.physics, s.lying_s, s.iteration),
+        lambda s: (s.sac, s.minds, s.physics, s.iteration),
         state,
-        (policy, minds, batch.state, batch.lying_s.copy(), state.iteration + 1),
+        (policy, minds, batch.state, state.iteration + 1),
     )
     metrics |= {"task_reward": earned}
     if (iteration + 1) % EVALUATE_EVERY == 0:
@@ -154,7 +153,7 @@ def collect(
 
 def observe(batch: RobotBatch, belief: Belief, module: Inference) -> Float[np.ndarray, "robot feature"]:
     """What the flat policy sees of each robot."""
-    joints = batch.spec.joint_state(batch.qpos, batch.qvel)
+    joints = batch.joint_state()
     return np.asarray(flat_observation(joints, batch.x.astype(np.float32), belief, reach(module)))
 
 
@@ -217,7 +216,6 @@ def initial_state(
         minds=minds,
         physics=batch.state,
         previous_qpos=batch.qpos.copy(),
-        lying_s=np.zeros(config.robots),
         iteration=np.zeros((), np.int64),
     )
 

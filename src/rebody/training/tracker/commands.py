@@ -23,15 +23,18 @@ class CommandDistribution:
     zero_share: float = 0.1
     """Share of commands that ask to stand still."""
 
-    def sample(self, key: PRNGKeyArray, pitch: Float[AnyArray, "*batch"], reach: Reach) -> Command:
-        """A command for each robot, which is at that pitch [rad]; a little beyond what will be asked."""
+    def sample(self, key: PRNGKeyArray, pitch: Float[AnyArray, "*batch"], reach: Reach, speed_share=1.0) -> Command:
+        """A command for each robot, which is at that pitch [rad]; a little beyond what will be asked.
+
+        `speed_share` is how much of the range of speeds is asked for.
+        """
         keys, shape = jax.random.split(key, 6), pitch.shape
         unit = jax.random.uniform(keys[0], shape, minval=-1.0)
         far = MARGIN * reach.distance * unit
         sign = jnp.where(jax.random.bernoulli(keys[1], shape=shape), 1.0, -1.0)
         near = sign * 10.0 ** jax.random.uniform(keys[2], shape, minval=-2.0, maxval=0.0)
         goal = jnp.where(jax.random.bernoulli(keys[3], self.near_share, shape), near, far)
-        speed = _between(MARGIN * reach.speed[0], MARGIN * reach.speed[1], unit)
+        speed = speed_share * _between(MARGIN * reach.speed[0], MARGIN * reach.speed[1], unit)
         slot = jax.random.randint(keys[4], shape, GOAL, len(slots_of(reach)))
         asked = jnp.where(slot == GOAL, goal, speed)
         if reach.pitch is not None:

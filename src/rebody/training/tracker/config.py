@@ -31,6 +31,9 @@ class TrackerConfig:
     curriculum_iterations: int = 0
     """The thesis' curriculum (6.4.1) in place of `segment_s`: for so many iterations an order lasts for a trajectory of
     300 control steps; then trajectories of 1000, a new order every 125, and often once one is reached. 0 for none."""
+    widening_iterations: int = 0
+    """Over so many iterations the speeds asked for widen from a quarter of the robot's reach to all of it: asked for
+    too much too early, a robot that has to balance learns to stand still instead."""
     guided_share: float = 0.25
     """Share of commands that come from a toy ahead of the robot, renewed at every decision."""
     max_horizon: int = 15

@@ -59,7 +59,7 @@ def renew(
         return
     spec = batch.spec
     pitch = spec.pitch(batch.qpos).astype(np.float32)
-    drawn = jax.tree.map(np.asarray, draw_commands(key, pitch, config))
+    drawn = jax.tree.map(np.asarray, draw_commands(key, pitch, config, lasting.speed_share))
     here = of_slot(drawn.slot, batch.x, pitch)
     shortest, longest = lasting.segment
     new = Orders(
@@ -96,9 +96,11 @@ def commands(orders: Orders, batch: RobotBatch) -> Command:
 
 
 @partial(jax.jit, static_argnames="config")
-def draw_commands(key: PRNGKeyArray, pitch: Float[AnyArray, " robot"], config: TrackerConfig) -> Command:
+def draw_commands(
+    key: PRNGKeyArray, pitch: Float[AnyArray, " robot"], config: TrackerConfig, speed_share=1.0
+) -> Command:
     """`CommandDistribution.sample`, compiled."""
-    return config.commands.sample(key, pitch, config.reach)
+    return config.commands.sample(key, pitch, config.reach, speed_share)
 
 
 @partial(jax.jit, static_argnames="max_horizon")

@@ -48,7 +48,6 @@ class RunState(eqx.Module):
     orders: Orders
     physics: Float[np.ndarray, "robot state"]
     previous_qpos: Float[np.ndarray, "robot nq"]  # at the last decision
-    lying_s: Float[np.ndarray, " robot"]
     iteration: Int[np.ndarray, ""]
 
 
@@ -70,7 +69,7 @@ def train_tracker(
     batch = RobotBatch(spec, config.robots)
     batch.reset(np.random.default_rng((seed, 1)))
     state = run.restore(initial_state(config, batch, jax.random.key(seed), init_from))
-    batch.state, batch.lying_s[:] = state.physics, state.lying_s
+    batch.state = state.physics
     state = run.loop(state, lambda state: iterate(state, batch, config, seed), config.iterations, "tracker")
     return save_tracker(_tracker(state, config), spec, config, run, seed)
 
@@ -83,12 +82,14 @@ def iterate(state: RunState, batch: RobotBatch, config: TrackerConfig, seed: int
     collect(state, batch, config, rng, collect_key)
     written = (iteration + 1) * config.steps * config.robots
     transitions = draw(state.replay, written, (config.updates, config.sac.batch_size), rng)
-    policy, metrics = learn(state.sac, transitions, learn_key, config, batch.spec.control_dt)
+    lasting = schedule(config, iteration, batch.spec.control_dt)
+    speed_share = jnp.asarray(lasting.speed_share)  # a number would be compiled anew whenever it changes
+    policy, metrics = learn(state.sac, transitions, learn_key, config, batch.spec.control_dt, speed_share)
     metrics |= experience(newest(state.replay, written, config.steps * config.robots), config, batch.spec.control_dt)
     state = eqx.tree_at(
-        lambda s: (s.sac, s.physics, s.lying_s, s.iteration),
+        lambda s: (s.sac, s.physics, s.iteration),
         state,
-        (policy, batch.state, batch.lying_s.copy(), state.iteration + 1),
+        (policy, batch.state, state.iteration + 1),
     )
     if (iteration + 1) % EVALUATE_EVERY == 0:
         figures = measure(_tracker(state, config), batch.spec)
@@ -110,13 +111,13 @@ def collect(
             follow_guides(orders, spec.observe(batch.qpos, state.previous_qpos), config)
             state.previous_qpos[:] = batch.qpos
         push(batch, config, rng)
-        joints, before, command = spec.joint_state(batch.qpos, batch.qvel), batch.qpos.copy(), commands(orders, batch)
+        joints, before, command = batch.joint_state(), batch.qpos.copy(), commands(orders, batch)
         action = np.asarray(_explore(state.sac.actor, joints, command, action_key, config))
         batch.step(action)
         seen = Replay(
             joints=joints,
             action=action,
-            next_joints=spec.joint_state(batch.qpos, batch.qvel),
+            next_joints=batch.joint_state(),
             motion=motion_of(batch, before),
             command=command,
         )
@@ -148,24 +149,26 @@ def begin_anew(state: RunState, batch: RobotBatch, who: Bool[np.ndarray, " robot
 
 @eqx.filter_jit
 def learn(
-    policy: SACState, transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float
+    policy: SACState, transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float, speed_share
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """One update of soft actor-critic per batch."""
 
     def batch_of(transitions: Replay, key: PRNGKeyArray) -> SACBatch:
-        return relabel(transitions, key, config, control_dt)
+        return relabel(transitions, key, config, control_dt, speed_share)
 
     return sac.update_many(policy, batch_of, transitions, jax.random.split(key, config.updates), config.sac)
 
 
-def relabel(transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float) -> SACBatch:
+def relabel(
+    transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float, speed_share=1.0
+) -> SACBatch:
     """Transitions with their own command or a new one, and the reward that it would have brought.
 
     A command is taken to last: afterwards the same goal in the world is nearer, a speed is the same.
     """
     motion, action, reach = transitions.motion, transitions.action, config.reach
     size = len(motion.pitch)
-    fresh = config.commands.sample(key, motion.pitch - motion.turn, reach)
+    fresh = config.commands.sample(key, motion.pitch - motion.turn, reach, speed_share)
     renewed = jnp.arange(size) < config.relabelled * size
     command = jax.tree.map(lambda new, old: jnp.where(renewed, new, old), fresh, transitions.command)
     return SACBatch(
@@ -182,7 +185,7 @@ def initial_state(
 ) -> RunState:
     """Robots without orders, an empty replay, a fresh policy or that of an artifact."""
     spec, rows = batch.spec, config.replay
-    joints = spec.joint_state(batch.qpos, batch.qvel)
+    joints = batch.joint_state()
     still = Command(np.zeros(len(joints), np.int32), np.zeros(len(joints), np.float32))
     moved = np.zeros(rows, np.float32)
     observed = tracker_observation(joints, still, config.reach).shape[-1]
@@ -195,13 +198,12 @@ def initial_state(
             joints=np.zeros((rows, joints.shape[-1]), np.float32),
             action=np.zeros((rows, spec.model.nu), np.float32),
             next_joints=np.zeros((rows, joints.shape[-1]), np.float32),
-            motion=Motion(moved.copy(), moved.copy(), moved, np.zeros(rows, bool)),
+            motion=Motion(moved.copy(), moved.copy(), moved.copy(), moved, np.zeros(rows, bool)),
             command=Command(np.zeros(rows, np.int32), np.zeros(rows, np.float32)),
         ),
         orders=no_orders(config.robots),
         physics=batch.state,
         previous_qpos=batch.qpos.copy(),
-        lying_s=np.zeros(config.robots),
         iteration=np.zeros((), np.int64),
     )
 
