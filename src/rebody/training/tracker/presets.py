@@ -17,7 +17,7 @@ def tracker_preset(spec: RobotSpec) -> TrackerConfig:
         # told of a far goal by its distance alone, it learns to stand there; relative errors make it walk, unless
         # staying alive pays more, or values grow large (a longer discount): then it never dares to
         reward=TrackerReward(relative=0.5, arrival=0.2, alive=0.1),
-        iterations=1200,
-        widening_iterations=400,
-        sac=replace(sprawling.sac, decay_updates=307_000),
+        iterations=900,
+        widening_iterations=300,
+        sac=replace(sprawling.sac, decay_updates=230_000),
     )

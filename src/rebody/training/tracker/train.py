@@ -27,7 +27,7 @@ from rebody.training.tracker.report import measure, save_tracker
 from rebody.training.tracker.schedule import schedule
 from rebody.types import AnyArray
 
-EVALUATE_EVERY = 50
+EVALUATE_EVERY = 100
 
 
 class Replay(eqx.Module):
