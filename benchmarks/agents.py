@@ -15,7 +15,7 @@ from rebody.agents.parts import load_flat, load_inference, load_tracker
 from rebody.bodies import load_robot
 from rebody.evaluation import Results, evaluate
 from rebody.evaluation.evaluate import Trial
-from rebody.evaluation.summary import with_interval
+from rebody.evaluation.statistics import with_interval
 from rebody.tasks.task_file import read_tasks
 
 TASKS = Path(__file__).parent / "tasks"

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rebody.evaluation.summary import percentile_95, regret, summarise, with_interval
+from rebody.evaluation.statistics import percentile_95, regret, with_interval
+from rebody.evaluation.summary import summarise
 
 VALUES = np.random.default_rng(0).gamma(1.0, size=40)
 

@@ -15,6 +15,8 @@ FIGURES = (
     ("ripple [m/s]", "ripple"),
 )
 """Of each family: what it is called, and where it stands in the summary."""
+CHANGES = ((r"base task right after \[s]", "noticed_s"), (r"within tolerance after \[s]", "recovered_s"))
+"""Of tasks that change in mid-episode."""
 SHARES = ("within_tolerance", "fell")
 
 
@@ -33,6 +35,10 @@ def summary_table(results: Sequence[Results]) -> Table:
         for name, key in FIGURES:
             unit = rf" \[{family.unit}]" if key.endswith("_error") else ""
             table.add_row(f"{family.name}: {name}{unit}", *(_cell(key, of.get(key)) for of in ofs))
+    changes = [summary["changes"] for summary in summaries]
+    if any(changes):
+        for name, key in CHANGES:
+            table.add_row(f"change: {name}", *(_cell(key, change and change[key]) for change in changes))
     for key in ("fell", "regret"):
         table.add_row(key, *(_cell(key, summary[key]) for summary in summaries))
     return table

@@ -1,0 +1,67 @@
+"""Tasks that change in mid-episode: how soon the new one is known, and done."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from rebody.evaluation.statistics import with_interval
+from rebody.tasks.figures import tolerance
+from rebody.types import DECISION_DT
+
+if TYPE_CHECKING:
+    from rebody.evaluation.results import EpisodeResult
+
+MEAN_S = 1.0
+"""Speeds are judged by their mean over this time, as in the final error."""
+
+
+def summarise_changes(episodes: Sequence["EpisodeResult"]) -> dict[str, Any] | None:
+    """Medians [s] over the episodes whose base task changes, with 95 % intervals; None if there are none.
+
+    `noticed_s`: from the change until family and sign are read rightly. `recovered_s`: until the error is within
+    tolerance. What never comes to pass counts as long as the episode lasted on.
+    """
+    changed = [episode for episode in episodes if _changes_base_task(episode)]
+    if not changed:
+        return None
+    return {
+        "episodes": len(changed),
+        "noticed_s": with_interval([_first_s(episode, base_task_right(episode)) for episode in changed], np.median),
+        "recovered_s": with_interval([_first_s(episode, _within_tolerance(episode)) for episode in changed], np.median),
+    }
+
+
+def base_task_right(episode: "EpisodeResult") -> Bool[np.ndarray, " time"]:
+    """Whether family and sign are read rightly from the belief after each decision."""
+    right_family = np.array(episode.inferred_family) == np.array(episode.active_family)
+    return right_family & (np.array(episode.inferred_target) * np.array(episode.active_target) > 0)
+
+
+def _changes_base_task(episode: "EpisodeResult") -> bool:
+    changes_family = episode.active_family[0] != episode.active_family[-1]
+    return changes_family or episode.active_target[0] * episode.active_target[-1] < 0
+
+
+def _first_s(episode: "EpisodeResult", holds: Bool[np.ndarray, " time"]) -> float:
+    """Seconds from the change to the first decision after it at which something holds."""
+    is_new = np.array(episode.active_target) == episode.active_target[-1]
+    after = holds[np.argmax(is_new) :]
+    decisions = np.argmax(after) + 1 if after.any() else len(after)
+    return float(decisions * DECISION_DT)
+
+
+def _within_tolerance(episode: "EpisodeResult") -> Bool[np.ndarray, " time"]:
+    family = episode.active_family[-1]
+    reached = np.array(episode.reached)
+    if family == "velocity":
+        reached = _mean_speed(np.array(episode.position_m))
+    return np.abs(reached - episode.active_target[-1]) <= tolerance(family)
+
+
+def _mean_speed(position: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
+    """Over the last second [m/s]; as far back as there is something in the first."""
+    steps = round(MEAN_S / DECISION_DT)
+    before = np.concatenate([np.full(steps, position[0]), position[:-steps]])
+    return (position - before) / MEAN_S
