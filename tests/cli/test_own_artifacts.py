@@ -23,7 +23,19 @@ PER_DECISION = {
     "cluster": int, "latent": list, "subgoal_family": str, "subgoal": float,
 }  # fmt: skip
 PER_EPISODE = {"family", "target", "seed", "fell", "return", "oracle_return", "final_error"}
-HEAD = {"version", "robot", "agent", "inference", "decision_dt", "control_dt", "stride", "horizon", "thesis", "summary"}
+HEAD = {
+    "version",
+    "robot",
+    "agent",
+    "inference",
+    "decision_dt",
+    "control_dt",
+    "stride",
+    "horizon",
+    "thesis",
+    "frozen",
+    "summary",
+}
 
 
 @pytest.fixture

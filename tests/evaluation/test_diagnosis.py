@@ -32,7 +32,7 @@ def episode_of(family="goal", target=4.0, *, read=None, subgoal=None, reached=No
 
 
 def results_of(*episodes, agent="reuse"):
-    return Results("cheetah", agent, "tiny", "tiny-tracker", 0.05, 1, 15, False, list(episodes))
+    return Results("cheetah", agent, "tiny", "tiny-tracker", 0.05, 1, 15, False, {}, list(episodes))
 
 
 def diagnosis_of(*episodes):

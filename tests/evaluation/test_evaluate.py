@@ -1,5 +1,6 @@
 """A whole evaluation on tiny parts, and what is refused before it starts."""
 
+import importlib
 import json
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from rebody.evaluation import evaluate, save_results
 from rebody.evaluation.evaluate import POINT_MASS
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import no_mixture
+from rebody.store import tree_hash
 from rebody.tasks.task_file import Switch, TaskSpec
 
 SPECS = [TaskSpec("goal", 2.0), TaskSpec("goal", 1.0, Switch(1.2, "goal", -3.0))]
@@ -50,6 +52,20 @@ def test_the_task_changes_at_its_moment(results):
         )
         x = np.array(episode.position_m)[-20:]
         assert episode.final_error == pytest.approx(np.abs(x + 3).mean(), abs=1e-4)
+
+
+def test_results_say_what_was_frozen(trial, results):
+    parts = trial.inference.parts
+    assert results.frozen == {"module": tree_hash(parts.module), "policy": tree_hash(parts.high_level)}
+    assert len(set(results.frozen.values())) == 2
+
+
+def test_a_run_that_changes_what_is_frozen_is_none(trial, monkeypatch):
+    hashes = iter([{"module": "a"}, {"module": "b"}])
+    module = importlib.import_module("rebody.evaluation.evaluate")  # the package gives its function under that name
+    monkeypatch.setattr(module, "frozen_hashes", lambda inference: next(hashes))
+    with pytest.raises(AssertionError, match="frozen"):
+        evaluate(trial, SPECS[:1], 1)
 
 
 def test_returns_are_sums_of_rewards(results):

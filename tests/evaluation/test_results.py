@@ -17,7 +17,7 @@ from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 from rebody.types import Belief, GlobalState, Subgoal
 
 HEAD = {
-    "version", "robot", "agent", "inference", "decision_dt", "control_dt", "stride", "horizon", "thesis", "episodes",
+    "version", "robot", "agent", "inference", "decision_dt", "control_dt", "stride", "horizon", "thesis", "frozen", "episodes",
     "summary",
 }  # fmt: skip
 SERIES = {
@@ -32,7 +32,7 @@ DECISIONS = 40
 
 @pytest.fixture
 def results(result):
-    return Results("cheetah", "reuse", "tiny", "tiny-tracker", 0.05, 1, 15, False, [result(), result(target=-1.0)])
+    return Results("cheetah", "reuse", "tiny", "tiny-tracker", 0.05, 1, 15, False, {}, [result(), result(target=-1.0)])
 
 
 def read(path):

@@ -28,7 +28,7 @@ def episode_of(target, family="goal", error=0.1):
 
 
 def results_of(*episodes):
-    return Results("cheetah", "reuse", "tiny", "tiny-tracker", 0.05, 1, 15, False, list(episodes))
+    return Results("cheetah", "reuse", "tiny", "tiny-tracker", 0.05, 1, 15, False, {}, list(episodes))
 
 
 def assert_drawn(path):

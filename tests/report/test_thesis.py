@@ -53,6 +53,7 @@ def several_of(episodes=3):
 
 PICTURE = {"picture": np.random.default_rng(0).integers(0, 255, (48, 64, 3)).astype(np.uint8)}
 STRIDES = {str(stride): episodes_of(1, decision_s=0.05 * stride) for stride in first.STRIDES}
+ON_ROBOT = several_of(several.EPISODES) | {"toy_pca": several_of()["pca"]}
 SYNTHETIC = {
     "6.1": PICTURE,
     "6.2": curves_of("return", "evaluation/return", "evaluation/oracle return"),
@@ -69,6 +70,7 @@ SYNTHETIC = {
     ),
     "6.14a": several_of(several.EPISODES),
     "6.14b": several_of(),
+    **dict.fromkeys(("6.16", "6.17", "6.18"), ON_ROBOT),
 }  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from rebody.agents.agent import Agent, FlatAgent, IdleAgent, OracleAgent, ReadoutAgent, ReuseAgent
 from rebody.agents.parts import Inference, LoadedFlat, LoadedSlots, LoadedTracker
 from rebody.agents.slots import OneSlot, SlotChooser, SlotOfCluster
+from rebody.bodies import RobotSpec
 from rebody.errors import RebodyError
 from rebody.inference.exact import exact_posterior, read_mode
 from rebody.store import tree_hash
@@ -33,10 +34,15 @@ def check_agent(kind: str) -> None:
         raise RebodyError(f"unknown agent '{kind}'. Agents are: {', '.join(AGENTS)}.")
 
 
-def check_robot_of(part: LoadedTracker | LoadedFlat, robot: str) -> None:
-    """RebodyError if a policy was trained on another robot."""
-    if part.robot != robot:
-        raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{robot}'.")
+def check_robot_of(part: LoadedTracker | LoadedFlat, spec: RobotSpec) -> None:
+    """RebodyError if a policy was trained on another robot, or on another description of it."""
+    if part.robot != spec.name:
+        raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{spec.name}'.")
+    if isinstance(part, LoadedTracker) and part.tracker.joints != spec.joints:
+        raise RebodyError(
+            f"'{part.name}' was trained on another description of '{spec.name}': it sees {part.tracker.joints} numbers "
+            f"of the body, which now gives {spec.joints}. Train it anew (rebody train tracker --robot {spec.name})."
+        )
 
 
 def check_module_of(what: str, part: LoadedFlat | LoadedSlots, inference: Inference) -> None:

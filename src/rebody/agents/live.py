@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from rebody.agents.agent import Observation
-from rebody.agents.build import HORIZON, build_agent, slot_chooser
+from rebody.agents.build import HORIZON, build_agent, check_robot_of, slot_chooser
 from rebody.agents.controller import TrackerController
 from rebody.agents.parts import Inference, LoadedSlots, LoadedTracker, load_inference, load_slots_of, load_tracker
 from rebody.agents.rollout import begin, decide, joint_action
@@ -27,7 +27,8 @@ class LiveAgent:
         slots: LoadedSlots | None = None,
         horizon: int = HORIZON,
     ):
-        """RebodyError if the module does not fit the robot."""
+        """RebodyError if the module or the tracker does not fit the robot."""
+        check_robot_of(tracker, spec)
         inference.contract.check_body(spec.name, spec.moving_fields, tracker.tracker.slots)
         self._spec, self._inference = spec, inference
         self._controller = TrackerController(tracker.tracker)

@@ -149,6 +149,11 @@ class RobotSpec:
             vx=vx, vy=still, vz=vz, pitch_rate=pitch_rate,
         )  # fmt: skip
 
+    @property
+    def joints(self) -> int:
+        """Size of the joint state."""
+        return self.model.nq - 1 + self.model.nv + (self.smoothing_s > 0)
+
     def next_pace(self, pace: Floats, moved: Floats) -> Floats:
         """The pace [m/s] after a control step by `moved` [m]."""
         share = min(1.0, self.control_dt / self.smoothing_s) if self.smoothing_s else 1.0

@@ -30,7 +30,7 @@ class Stress:
             raise RebodyError("--episodes must be at least 1.")
         spec = load_robot(self.robot)
         loaded = load_tracker(self.tracker or f"tracker-{spec.name}")
-        check_robot_of(loaded, spec.name)
+        check_robot_of(loaded, spec)
         console = Console()
         with console.status(f"{self.episodes} episodes of {SECONDS:g} s"):
             result = stress(loaded.tracker, spec, self.episodes, self.seed)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from rebody.bodies.robot import Reach
@@ -64,6 +65,12 @@ class Tracker(eqx.Module):
 
     actor: Actor
     reach: Reach = eqx.field(static=True)
+
+    @property
+    def joints(self) -> int:
+        """Size of the joint state that it sees."""
+        nothing = Command(np.zeros((), np.int32), np.zeros((), np.float32))
+        return self.actor.observations - tracker_observation(np.zeros(0, np.float32), nothing, self.reach).size
 
     @property
     def slots(self) -> tuple[str, ...]:

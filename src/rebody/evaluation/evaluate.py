@@ -24,6 +24,7 @@ from rebody.bodies.toys import Toy
 from rebody.control.tracker import slots_of
 from rebody.errors import RebodyError
 from rebody.evaluation.results import Results, episode_results
+from rebody.store import tree_hash
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, Task
 
@@ -77,7 +78,9 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
     episode_seeds = np.tile(np.arange(seeds), len(specs) // seeds)
     tasks = active_tasks(specs, trial.decisions, DECISION_DT)
     agent = trial_agent(trial, tasks)
+    frozen = frozen_hashes(trial.inference)
     episodes = run_trial(trial, agent, tasks, episode_seeds)
+    assert frozen_hashes(trial.inference) == frozen, "what is frozen has changed"
     oracle = episodes if trial.agent == "oracle" else _run_oracle(trial, tasks, episode_seeds)
     read, clusters = agent.reader(episodes.belief), _clusters(trial, episodes)
     oracle_returns = None if oracle is None else np.asarray(oracle.reward).sum(axis=0)
@@ -90,8 +93,14 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
         stride=trial.stride,
         horizon=trial.horizon,
         thesis=trial.thesis,
+        frozen=frozen,
         episodes=episode_results(specs, episode_seeds, tasks, episodes, read, clusters, oracle_returns),
     )
+
+
+def frozen_hashes(inference: Inference) -> dict[str, str]:
+    """SHA-256 of all that a transfer may not change."""
+    return {"module": tree_hash(inference.parts.module), "policy": tree_hash(inference.parts.high_level)}
 
 
 def trial_agent(trial: Trial, tasks: Task) -> Agent:
@@ -158,7 +167,7 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
     trial.inference.contract.check_body(trial.robot.name, trial.robot.moving_fields, slots)
     for part in (trial.tracker, trial.flat):
         if part is not None:
-            check_robot_of(part, trial.robot.name)
+            check_robot_of(part, trial.robot)
     if trial.flat is not None:
         check_module_of("flat policy", trial.flat, trial.inference)
 

@@ -78,6 +78,8 @@ class Results:
     stride: int
     horizon: int
     thesis: bool
+    frozen: dict[str, str]
+    """SHA-256 of the inference module and of the toy's policy, the same before the episodes and after them."""
     episodes: list[EpisodeResult]
 
     def of(self, family: str) -> list[EpisodeResult]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from rebody.errors import RebodyError
 from rebody.report.thesis import first_experiment as first
 from rebody.report.thesis import several_families as several
+from rebody.report.thesis import zero_shot
 from rebody.report.thesis.data import Data, save, shipped
 
 
@@ -25,6 +26,19 @@ class ThesisFigure:
     """Draws a log into a PNG with a caption."""
     caption: str
     """What is seen."""
+
+
+def _zero_shot(number: str, robot: str) -> ThesisFigure:
+    return ThesisFigure(
+        number,
+        f"goals and speeds on the {robot}, zero-shot",
+        shipped(number),
+        lambda _: zero_shot.on_robot(robot),
+        zero_shot.draw_robot,
+        f"`goal-velocity`, frozen, on the {robot} that took no part in its training, from x = 0 at rest. Left: goals, "
+        "middle: speeds; dotted: what was hidden. Right: latents from the 20th decision on, in the plane of the two "
+        "main components of the toy's (grey, the same tasks).",
+    )
 
 
 FIGURES = {
@@ -138,6 +152,9 @@ FIGURES = {
             "Latents of `goal-velocity` from the 20th decision on, 12 tasks of each base task. Left: t-SNE, as in the "
             "thesis. Right: the two main components (PCA), where distances mean something.",
         ),
+        _zero_shot("6.16", "cheetah"),
+        _zero_shot("6.17", "walker"),
+        _zero_shot("6.18", "hopper"),
     )
 }
 

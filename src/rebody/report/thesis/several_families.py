@@ -75,7 +75,7 @@ def draw_training(data: Data, path: Path, text: str) -> None:
 
 def on_toy() -> Data:
     """`goal-velocity` on the toy."""
-    return trajectories(Trial("reuse", load_inference("goal-velocity"), None, None), _tasks())
+    return trajectories(Trial("reuse", load_inference("goal-velocity"), None, None), tasks_of_each_kind())
 
 
 def projections() -> Data:
@@ -93,41 +93,48 @@ def projections() -> Data:
     }
 
 
-def _tasks() -> list[TaskSpec]:
-    """Evenly spaced over each base task."""
+def tasks_of_each_kind(speeds: tuple[float, float] = (-np.inf, np.inf)) -> list[TaskSpec]:
+    """Evenly spaced over each base task, as far as a body is fast enough [m/s]."""
     specs = []
     for task in PRESETS["goal-velocity"]().tasks.base_tasks:
-        specs += [TaskSpec(task.family, float(target)) for target in np.linspace(task.low, task.high, EPISODES)]
+        ends = np.clip((task.low, task.high), *speeds) if task.family == "velocity" else (task.low, task.high)
+        specs += [TaskSpec(task.family, float(target)) for target in np.linspace(*ends, EPISODES)]
     return specs
 
 
 def draw_ways(data: Data, path: Path, text: str) -> None:
     """Positions on goals, velocities on speeds."""
-    panels = ((GOAL, "position_m", "x [m]"), (VELOCITY, "velocity_m_s", "velocity [m/s]"))
-    with figure(path, 1, 2, size=(10.5, 4.4)) as (drawing, all_axes):
-        for axes, (family, series, label) in zip(all_axes, panels, strict=True):
-            for i in np.flatnonzero(data["family"] == family)[:: EPISODES // SHOWN]:
-                _, colour = BASE_TASKS[_labels(data)[i]]
-                axes.plot(data["time_s"], data[series][:, i], color=colour, lw=1.2)
-                axes.axhline(data["target"][i], color=colour, lw=0.8, ls=":")
-            axes.set(xlabel="time [s]", ylabel=label, xlim=(0, data["time_s"][-1]))
+    with figure(path, 1, 2, size=(10.5, 4.4)) as (drawing, (positions, velocities)):
+        ways_panels(positions, velocities, data)
         caption(drawing, text)
+
+
+def ways_panels(positions: Axes, velocities: Axes, data: Data) -> None:
+    """A few episodes of each base task, dotted what was hidden."""
+    panels = ((positions, GOAL, "position_m", "x [m]"), (velocities, VELOCITY, "velocity_m_s", "velocity [m/s]"))
+    for axes, family, series, label in panels:
+        for i in np.flatnonzero(data["family"] == family)[:: EPISODES // SHOWN]:
+            _, colour = BASE_TASKS[_labels(data)[i]]
+            axes.plot(data["time_s"], data[series][:, i], color=colour, lw=1.2)
+            axes.axhline(data["target"][i], color=colour, lw=0.8, ls=":")
+        axes.set(xlabel="time [s]", ylabel=label, xlim=(0, data["time_s"][-1]))
 
 
 def draw_projections(data: Data, path: Path, text: str) -> None:
     """Latents of many decisions in two dimensions."""
     with figure(path, 1, 2, size=(10.5, 5.2)) as (drawing, (tsne, pca)):
-        _draw_points(tsne, data["tsne"], _labels(data))
-        _draw_points(pca, data["pca"], _labels(data))
+        points_panel(tsne, data["tsne"], data)
+        points_panel(pca, data["pca"], data)
         tsne.set(title="t-SNE")
         pca.set(title="PCA")
         tsne.legend(frameon=False, fontsize=8, markerscale=2)
         caption(drawing, text)
 
 
-def _draw_points(axes: Axes, points: np.ndarray, labels: list[int]) -> None:
+def points_panel(axes: Axes, points: np.ndarray, data: Data) -> None:
+    """Points [time, episode, 2] in the colours of their base tasks."""
     for number, (name, colour) in BASE_TASKS.items():
-        x, y = points[:, np.array(labels) == number].reshape(-1, 2).T
+        x, y = points[:, np.array(_labels(data)) == number].reshape(-1, 2).T
         axes.plot(x, y, ".", color=colour, ms=3, label=name)
     axes.set(xticks=[], yticks=[])
 
