@@ -17,8 +17,8 @@ from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 from rebody.types import Belief, GlobalState, Subgoal
 
 HEAD = {
-    "version", "robot", "agent", "inference", "decision_dt", "control_dt", "stride", "horizon", "thesis", "frozen", "episodes",
-    "summary",
+    "version", "robot", "agent", "inference", "decision_dt", "control_dt", "stride", "horizon", "thesis", "frozen",
+    "episodes", "summary",
 }  # fmt: skip
 SERIES = {
     "time_s", "position_m", "velocity_m_s", "pitch_rad", "vz_max_m_s", "reward", "active_family", "active_target",

@@ -97,8 +97,9 @@ def tasks_of_each_kind(speeds: tuple[float, float] = (-np.inf, np.inf)) -> list[
     """Evenly spaced over each base task, as far as a body is fast enough [m/s]."""
     specs = []
     for task in PRESETS["goal-velocity"]().tasks.base_tasks:
-        ends = np.clip((task.low, task.high), *speeds) if task.family == "velocity" else (task.low, task.high)
-        specs += [TaskSpec(task.family, float(target)) for target in np.linspace(*ends, EPISODES)]
+        slowest, fastest = speeds if task.family == "velocity" else (-np.inf, np.inf)
+        targets = np.linspace(max(task.low, slowest), min(task.high, fastest), EPISODES)
+        specs += [TaskSpec(task.family, float(target)) for target in targets]
     return specs
 
 
@@ -116,7 +117,7 @@ def ways_panels(positions: Axes, velocities: Axes, data: Data) -> None:
         for i in np.flatnonzero(data["family"] == family)[:: EPISODES // SHOWN]:
             _, colour = BASE_TASKS[_labels(data)[i]]
             axes.plot(data["time_s"], data[series][:, i], color=colour, lw=1.2)
-            axes.axhline(data["target"][i], color=colour, lw=0.8, ls=":")
+            axes.axhline(float(data["target"][i]), color=colour, lw=0.8, ls=":")
         axes.set(xlabel="time [s]", ylabel=label, xlim=(0, data["time_s"][-1]))
 
 
