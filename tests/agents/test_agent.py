@@ -13,7 +13,7 @@ from rebody.agents.build import AGENTS, build_agent
 from rebody.agents.parts import Inference, inference_template
 from rebody.agents.rollout import begin, decide
 from rebody.bodies.toys import FullToy
-from rebody.control.high_level import policy_observation
+from rebody.control.high_level import PolicyView
 from rebody.errors import RebodyError
 from rebody.inference.contract import Contract
 from rebody.inference.probe import fit_probe
@@ -258,7 +258,7 @@ def test_a_subgoal_to_stand_is_the_pitch_that_the_full_toy_would_have(standing):
     said = standing.parts.module.decoder.interpret(belief)
     for _ in range(4):
         here = replace(state, x=x, pitch=pitch, pitch_rate=turn)
-        seen = policy_observation(here, said, ("pitch", "pitch_rate"), (10.0, 3.5), (("x", 9.0), ("pitch", 1.0)))
+        seen = PolicyView(("pitch", "pitch_rate"), (10.0, 3.5), (("x", 9.0), ("pitch", 1.0)))(here, said)
         force, _, torque = (np.array([7.0, 0.0, 6.0]) * np.asarray(standing.parts.high_level.actor(seen))).T
         vx = (vx + 0.1 * (force - 2.0 * vx)).astype("f4")
         turn = (turn + 0.1 * (torque - 4.0 * turn - 4.0 * pitch)).astype("f4")

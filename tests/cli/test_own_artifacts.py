@@ -161,7 +161,7 @@ def test_a_module_of_the_position_toy(tiny_training, tmp_path):
     assert loaded.toy == PositionToy()
     assert loaded.contract.target_ranges == {"goal": (0.0, 10.0)}
     assert loaded.parts.module.encoder.latent == 1
-    assert loaded.parts.high_level.fields == loaded.parts.told_policy.fields == ("x",)
+    assert loaded.parts.high_level.view.fields == loaded.parts.told_policy.view.fields == ("x",)
     other = [*tiny_training["inference"], *untrained, "--preset", "position-thesis", "--toy", "mass-damper"]
     assert run([*other, "--out", str(tmp_path / "other")]) == 0
     assert load_inference(str(tmp_path / "other")).toy == MassDamper()

@@ -5,7 +5,7 @@ import pytest
 
 from rebody.agents.parts import task_code
 from rebody.control.flat import flat_observation
-from rebody.control.high_level import TaskCode, observation_size, policy_observation
+from rebody.control.high_level import PolicyView, TaskCode
 from rebody.tasks import GOAL, VELOCITY
 from rebody.types import Belief, GlobalState, Task
 
@@ -35,27 +35,26 @@ def test_targets_are_divided_by_the_largest_of_their_family():
 
 def test_a_policy_sees_scaled_fields_then_mean_and_deviation():
     state = GlobalState(*(np.asarray(i, np.float32) for i in range(8)))
-    np.testing.assert_allclose(
-        policy_observation(state, BELIEF, ("vx", "x"), (2.0, 7.0)), [2.0, 0.0, 0.5, -1.0, 0.5, 2.0]
-    )
+    np.testing.assert_allclose(PolicyView(("vx", "x"), (2.0, 7.0))(state, BELIEF), [2.0, 0.0, 0.5, -1.0, 0.5, 2.0])
 
 
 def test_places_are_seen_from_where_the_body_is():
     """Two fields, the second likelier: its place as it is, the first's faded by how much less likely it is."""
     state = GlobalState(*(np.asarray(value, np.float32) for value in (6.0, 0, 0, 0, -1.0, 0, 0, 0)))
     belief = Belief(np.array([0.2, 0.8, -0.4, 0.5], "f4"), np.array([0.0, 0.0, 0.04, 0.01], "f4"))
-    seen = policy_observation(state, belief, ("vx",), (2.0,), (("x", 10.0), ("vx", 2.0)))
+    view = PolicyView(("vx",), (2.0,), (("x", 10.0), ("vx", 2.0)))
+    seen = view(state, belief)
     faded = np.array([0.25, 1.0])
     expected = [[-0.5], [0.2, 0.8], faded * [-1.0, 1.0], faded * [0.4, 0.5], faded * [0.2, 0.1]]
     np.testing.assert_allclose(seen, np.concatenate(expected), rtol=1e-5)
-    assert len(seen) == observation_size(1, 4, (("x", 10.0), ("vx", 2.0)))
+    assert len(seen) == view.size(4)
 
 
 def test_far_from_home_and_near_it_are_the_same_and_farther_than_far_too():
     def seen(x, goal):
         state = GlobalState(*(np.asarray(value, np.float32) for value in (x, 0, 0, 0, 1.0, 0, 0, 0)))
         told = CODE(Task(np.array(GOAL), np.asarray(goal, np.float32)))
-        return np.asarray(policy_observation(state, told, ("vx",), (3.0,), CODE.places))
+        return np.asarray(PolicyView(("vx",), (3.0,), CODE.places)(state, told))
 
     size = 5  # where the magnitude of the goal itself stands: a relative reward depends on it
     np.testing.assert_allclose(seen(40.0, 35.0)[:size], seen(2.0, -3.0)[:size], rtol=1e-5)

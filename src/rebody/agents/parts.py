@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import equinox as eqx
@@ -15,7 +15,7 @@ from rebody.agents.slots import SlotClassifier
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import Toy, make_toy
 from rebody.control.flat import FlatPolicy
-from rebody.control.high_level import HighLevelPolicy, Places, TaskCode, observation_size
+from rebody.control.high_level import HighLevelPolicy, PolicyView, TaskCode
 from rebody.control.sac import Actor, SACConfig
 from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
@@ -96,14 +96,13 @@ def inference_template(config: dict[str, Any]) -> InferenceParts:
     inference, policy, mixture = config["inference"], config["high_level"], config.get("mixture")
     actions = make_toy(**config["toy"]).actions
     settings = InferenceConfig(**with_tuples(inference))
-    ranges = config["contract"]["target_ranges"]
+    ranges = with_tuples(config["contract"]["target_ranges"])
+    view = PolicyView(tuple(policy["fields"]), tuple(policy["scales"]), settings.places)
     weights = np.zeros((settings.latent + 1, len(ranges)), np.float32)
     return InferenceParts(
         module=InferenceModule(settings, actions, jax.random.key(0)),
-        high_level=_policy_template(settings.latent, settings.places, actions, policy),
-        told_policy=_policy_template(
-            2 * len(ranges), task_code(with_tuples(ranges)).places if settings.kinds else (), actions, policy
-        ),
+        high_level=_policy_template(view, settings.latent, actions, policy),
+        told_policy=_policy_template(told_view(view, ranges), 2 * len(ranges), actions, policy),
         probe=Probe(np.zeros(len(ranges), np.int32), weights, weights),
         mixture=no_mixture(mixture["maximum"], settings.clustered) if mixture else None,
     )
@@ -170,6 +169,11 @@ def task_code(target_ranges: Mapping[str, tuple[float, float]]) -> TaskCode:
     return TaskCode(tuple((family_index(name), max(abs(end) for end in ends)) for name, ends in target_ranges.items()))
 
 
+def told_view(view: PolicyView, target_ranges: Mapping[str, tuple[float, float]]) -> PolicyView:
+    """What a policy that is told its task sees, beside one that sees a belief: places where that sees places."""
+    return replace(view, places=task_code(target_ranges).places if view.places else ())
+
+
 def _fill(template: Callable[[dict[str, Any]], Tree], artifact: Artifact) -> Tree:
     """The template of an artifact's configuration with its weights; no random weights are drawn for it."""
     shapes = eqx.filter_eval_shape(lambda: template(artifact.config))
@@ -189,11 +193,8 @@ def _understood(artifact: Artifact) -> Iterator[None]:
         ) from error
 
 
-def _policy_template(believed: int, places: Places, actions: int, config: dict[str, Any]) -> HighLevelPolicy:
-    size = observation_size(len(config["fields"]), believed, places)
-    return HighLevelPolicy(
-        _actor_template(size, actions, config), tuple(config["fields"]), tuple(config["scales"]), places
-    )
+def _policy_template(view: PolicyView, believed: int, actions: int, config: dict[str, Any]) -> HighLevelPolicy:
+    return HighLevelPolicy(_actor_template(view.size(believed), actions, config), view)
 
 
 def _actor_template(observations: int, actions: int, config: dict[str, Any]) -> Actor:

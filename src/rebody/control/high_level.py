@@ -1,5 +1,7 @@
 """The high-level policy: (global state, belief) -> action of the toy."""
 
+from dataclasses import dataclass
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
@@ -14,17 +16,49 @@ FARTHEST = 2.0
 """A place is seen as this far ahead at most, in units of its scale: one farther off asks for nothing else."""
 
 
+@dataclass(frozen=True)
+class PolicyView:
+    """What a high-level policy sees of a global state and a belief: a vector of so many scaled numbers."""
+
+    fields: tuple[str, ...]
+    """Of the global state."""
+    scales: tuple[float, ...]
+    """What each of them is divided by."""
+    places: Places = ()
+    """What a belief says the places of; none for one that is seen as it is."""
+
+    def __call__(self, state: GlobalState, belief: Belief) -> Float[AnyArray, "*batch feature"]:
+        """Scaled fields of the global state, then what is believed.
+
+        That is mean and standard deviation of a belief; one that says places (`Decoder.interpret`, `TaskCode`) is seen
+        from where the body is: how likely each field is meant, how far ahead its place is, how far that is from zero
+        (which is what a relative reward is relative to), and how sure. Far from home and near it are the same then.
+        """
+        here = state.select(self.fields) / jnp.asarray(self.scales)
+        if not self.places:
+            return jnp.concatenate([here, belief.features()], axis=-1)
+        names, units = zip(*self.places, strict=True)
+        share, place = jnp.split(belief.mean, 2, axis=-1)
+        _, doubt = jnp.split(belief.variance**0.5, 2, axis=-1)
+        ahead = jnp.clip(place - state.select(names) / jnp.asarray(units), -FARTHEST, FARTHEST)
+        # the likeliest field's place as it is: a share of 0.998 would put it 3 cm short of 15 m
+        gate = share / jnp.max(share, axis=-1, keepdims=True)
+        return jnp.concatenate([here, share, gate * ahead, gate * jnp.abs(place), gate * doubt], axis=-1)
+
+    def size(self, believed: int) -> int:
+        """How many numbers it sees, with a belief of so many."""
+        return len(self.fields) + (4 * len(self.places) if self.places else 2 * believed)
+
+
 class HighLevelPolicy(eqx.Module):
-    """An actor with its fixed input scaling."""
+    """An actor with what it sees."""
 
     actor: Actor
-    fields: tuple[str, ...] = eqx.field(static=True)
-    scales: tuple[float, ...] = eqx.field(static=True)
-    places: Places = eqx.field(static=True, default=())
+    view: PolicyView = eqx.field(static=True)
 
     def __call__(self, state: GlobalState, belief: Belief) -> Float[AnyArray, "*batch action"]:
         """The most likely action, in [-1, 1]."""
-        return self.actor(policy_observation(state, belief, self.fields, self.scales, self.places))
+        return self.actor(self.view(state, belief))
 
 
 class TaskCode(eqx.Module):
@@ -44,29 +78,3 @@ class TaskCode(eqx.Module):
         target = task.target[..., None] / jnp.asarray([scale for _, scale in self.scales])
         mean = jnp.concatenate([is_on, is_on * target], axis=-1)
         return Belief(mean, jnp.zeros_like(mean))
-
-
-def policy_observation(
-    state: GlobalState, belief: Belief, fields: tuple[str, ...], scales: tuple[float, ...], places: Places = ()
-) -> Float[AnyArray, "*batch feature"]:
-    """Scaled fields of the global state, then what is believed.
-
-    That is mean and standard deviation of a belief; one that says places (`Decoder.interpret`, `TaskCode`) is seen from
-    where the body is: how likely each field is meant, how far ahead its place is, how far that is from zero (which is
-    what a relative reward is relative to), and how sure. Far from home and near it are the same then.
-    """
-    here = state.select(fields) / jnp.asarray(scales)
-    if not places:
-        return jnp.concatenate([here, belief.features()], axis=-1)
-    names, units = zip(*places, strict=True)
-    share, place = jnp.split(belief.mean, 2, axis=-1)
-    _, doubt = jnp.split(belief.variance**0.5, 2, axis=-1)
-    ahead = jnp.clip(place - state.select(names) / jnp.asarray(units), -FARTHEST, FARTHEST)
-    # the likeliest field's place as it is: a share of 0.998 would put it 3 cm short of 15 m
-    gate = share / jnp.max(share, axis=-1, keepdims=True)
-    return jnp.concatenate([here, share, gate * ahead, gate * jnp.abs(place), gate * doubt], axis=-1)
-
-
-def observation_size(fields: int, believed: int, places: Places) -> int:
-    """Numbers in a `policy_observation` of so many fields and a belief of so many."""
-    return fields + (4 * len(places) if places else 2 * believed)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rebody.bodies.toys import FullToy, MassDamper, Randomisation, make_toy
-from rebody.control.high_level import policy_observation
 from rebody.tasks import GOAL, STAND, BaseTask, TaskDistribution, reward
 from rebody.training.inference.episodes import collect, refresh_beliefs, roles
 from rebody.training.inference.train import initial_state
@@ -101,7 +100,7 @@ def test_the_second_half_is_disturbed(episodes, config):
 
 def test_those_who_decide_take_the_most_likely_action(episodes, config, state):
     now = jax.tree.map(lambda leaf: leaf[:, :-1], (episodes.state, episodes.belief))
-    likely = state.sac.actor(policy_observation(*now, config.policy_fields, config.policy_scales))
+    likely = state.sac.actor(config.policy_view(*now))
     away = np.abs(np.asarray(episodes.action - likely))[..., 0].max(axis=1)
     np.testing.assert_array_equal(away < 1e-5, roles(8, False).decides)
 

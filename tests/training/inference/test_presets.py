@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from rebody.bodies.toys import make_toy, no_disturbance
+from rebody.control.high_level import PolicyView
+from rebody.errors import RebodyError
 from rebody.tasks import FAMILIES
 from rebody.training.inference import PRESETS
 
@@ -23,11 +25,12 @@ def preset(request):
 def test_encoder_and_policy_see_what_moves(preset):
     inference = preset.inference
     places = {field for field, _ in inference.places}
-    for fields, scales in ((inference.fields, inference.scales), preset.policy_view):
+    view = preset.policy_view
+    for fields, scales in ((inference.fields, inference.scales), (view.fields, view.scales)):
         assert set(fields) <= MOVES[preset.toy]
         assert len(fields) == len(scales)
         assert {SHOWN_BY[family] for family in preset.target_ranges} <= {*fields, *places}
-    assert len(preset.told_places) == (len(preset.target_ranges) if places else 0)
+    assert len(preset.told_view.places) == (len(preset.target_ranges) if places else 0)
 
 
 def test_tasks_can_be_done_by_the_toy(preset):
@@ -62,7 +65,18 @@ def test_noise_takes_the_place_of_all_disturbances(name, variance):
 
 def test_a_policy_without_places_sees_what_the_encoder_sees():
     whole = PRESETS["goal-velocity"]()
-    assert whole.policy_view == (("vx",), (3.0,))
+    assert whole.policy_view == PolicyView(("vx",), (3.0,), whole.inference.places)
     unsplit = replace(whole, inference=replace(whole.inference, kinds=0))
-    assert unsplit.policy_view == (("x", "vx"), (10.0, 3.0))
-    assert PRESETS["position"]().policy_view == (("x", "vx"), (10.0, 3.5))
+    assert unsplit.policy_view == PolicyView(("x", "vx"), (10.0, 3.0))
+    assert PRESETS["position"]().policy_view == PolicyView(("x", "vx"), (10.0, 3.5))
+
+
+@pytest.mark.parametrize("option", ["--policy-scales", "--inference.scales"])
+def test_every_field_has_its_scale(option):
+    preset = PRESETS["goal-velocity"]()
+    changes = {
+        "--policy-scales": {"policy_scales": (1.0, 2.0)},
+        "--inference.scales": {"inference": replace(preset.inference, scales=(10.0,))},
+    }
+    with pytest.raises(RebodyError, match=f"{option} must give a number for each of"):
+        replace(preset, **changes[option])

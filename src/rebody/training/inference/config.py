@@ -3,10 +3,11 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from rebody.agents.parts import task_code
+from rebody.agents.parts import told_view
 from rebody.bodies.toys import Randomisation
-from rebody.control.high_level import Places
+from rebody.control.high_level import PolicyView
 from rebody.control.sac import SACConfig
+from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
 from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
 
@@ -88,21 +89,33 @@ class MetaConfig:
     policy_updates: int = 512
     """Updates of the policy in an iteration, and of the policy that is told the task in joint ones."""
 
-    @property
-    def policy_view(self) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """Fields of the global state that the policies see, and their scales.
+    def __post_init__(self):
+        """RebodyError where a field has no scale, or a scale no field."""
+        pairs = (
+            ("--policy-scales", self.policy_fields, self.policy_scales),
+            ("--inference.scales", self.inference.fields, self.inference.scales),
+        )
+        for option, fields, scales in pairs:
+            if len(fields) != len(scales):
+                raise RebodyError(
+                    f"{option} must give a number for each of {', '.join(fields)}: {len(fields)}, not {len(scales)}."
+                )
 
-        Where the latent is not split no place is seen as a distance, so they see what the encoder sees as it is, too.
+    @property
+    def policy_view(self) -> PolicyView:
+        """What the policy sees.
+
+        Where the latent is not split no place is seen as a distance, so it sees what the encoder sees as it is, too.
         """
         scales = dict(zip(self.policy_fields, self.policy_scales, strict=True))
         if not self.inference.places:
             scales = dict(zip(self.inference.fields, self.inference.scales, strict=True)) | scales
-        return tuple(scales), tuple(scales.values())
+        return PolicyView(tuple(scales), tuple(scales.values()), self.inference.places)
 
     @property
-    def told_places(self) -> Places:
-        """What the policy that is told its task sees the places of."""
-        return task_code(self.target_ranges).places if self.inference.places else ()
+    def told_view(self) -> PolicyView:
+        """What the policy that is told its task sees."""
+        return told_view(self.policy_view, self.target_ranges)
 
     @property
     def target_ranges(self) -> dict[str, tuple[float, float]]:

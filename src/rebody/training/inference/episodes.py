@@ -6,7 +6,6 @@ import jax.numpy as jnp
 from jaxtyping import Bool, Float, PRNGKeyArray
 
 from rebody.bodies.toys import Toy, ToyState, no_disturbance
-from rebody.control.high_level import policy_observation
 from rebody.control.sac import Actor
 from rebody.inference import Encoder, InferenceModule
 from rebody.tasks import reward
@@ -67,7 +66,7 @@ def collect(
         task, key = inputs
         body, seen, carry, belief, held = walk
         action_key, step_key, noise_key, wander_key = jax.random.split(key, 4)
-        observation = policy_observation(seen, interpret(belief), *config.policy_view, config.inference.places)
+        observation = config.policy_view(seen, interpret(belief))
         sampled, _ = actor.sample(observation, action_key)
         held = _wander(held, config.turn_probability, wander_key)
         action = jnp.where(roles.decides[:, None], actor(observation), sampled)

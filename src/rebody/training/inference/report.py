@@ -22,14 +22,14 @@ def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run
     """Fit the probe, measure, write artifact and card."""
     figures = measure_in_depth(parts, toy, config, HELD_OUT)
     parts = eqx.tree_at(lambda p: p.probe, parts, fit(parts, toy, config, HELD_OUT, disturbed=True))
-    contract, (fields, scales) = contract_of(config), config.policy_view
+    contract, view = contract_of(config), config.policy_view
     stored = {
         "contract": contract.to_config(),
         "inference": asdict(config.inference),
         "mixture": asdict(config.mixture) if config.prior == "mixture" else None,
         "high_level": {
-            "fields": fields,
-            "scales": scales,
+            "fields": view.fields,
+            "scales": view.scales,
             "hidden": config.sac.hidden,
             "projections": config.sac.projections,
         },

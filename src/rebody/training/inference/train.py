@@ -17,7 +17,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from rebody.agents.parts import InferenceParts, load_inference, task_code
 from rebody.bodies.toys import Toy, make_toy
 from rebody.control import sac
-from rebody.control.high_level import HighLevelPolicy, Places, observation_size, policy_observation
+from rebody.control.high_level import HighLevelPolicy, PolicyView
 from rebody.control.sac import SACBatch, SACState
 from rebody.errors import RebodyError
 from rebody.inference.mixture.padded import Clusters, clusters_of, no_clusters
@@ -97,11 +97,10 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
             replay = refresh_beliefs(module.encoder, replay)
             # it acts in no episode itself: later ones, of a policy that hardly explores, would lead it astray
             told_replay = tell(replay, config)
-            told, told_metrics = update_policy(told, told_replay, stored, config, config.told_places, keys[2])
+            told, told_metrics = update_policy(told, told_replay, stored, config, config.told_view, keys[2])
             metrics |= {f"told/{name}": value for name, value in told_metrics.items()}
         interpreted = eqx.tree_at(lambda e: e.belief, replay, module.decoder.interpret(replay.belief))
-        places = config.inference.places
-        policy, policy_metrics = update_policy(policy, interpreted, stored, config, places, keys[2])
+        policy, policy_metrics = update_policy(policy, interpreted, stored, config, config.policy_view, keys[2])
         metrics |= policy_metrics
     state = RunState(module, optimiser, policy, told, clusters, replay, state.iteration + 1)
     if (iteration + 1) % EVALUATE_EVERY == 0:
@@ -121,9 +120,8 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
     module = InferenceModule(config.inference, toy.actions, module_key)
-    fields, inference = len(config.policy_view[0]), config.inference
-    seen = observation_size(fields, inference.latent, inference.places)
-    seen_told = observation_size(fields, 2 * len(config.tasks.families), config.told_places)
+    seen = config.policy_view.size(config.inference.latent)
+    seen_told = config.told_view.size(2 * len(config.tasks.families))
     policy, told = (sac.initial_state(size, toy.actions, config.sac, sac_key) for size in (seen, seen_told))
     clusters = no_clusters(config.mixture.maximum, config.inference.clustered)
     if init_from is not None:
@@ -154,8 +152,8 @@ def _take_over(trained: InferenceModule, fresh: InferenceModule, name: str) -> I
 def trained_parts(state: RunState, config: MetaConfig) -> InferenceParts:
     """What is kept of a run, its probe not yet fitted."""
     by_belief, by_task = (
-        HighLevelPolicy(policy.averaged_actor, *config.policy_view, places)
-        for policy, places in ((state.sac, config.inference.places), (state.told, config.told_places))
+        HighLevelPolicy(policy.averaged_actor, view)
+        for policy, view in ((state.sac, config.policy_view), (state.told, config.told_view))
     )
     unfitted = jnp.zeros((config.inference.latent + 1, len(config.tasks.families)))
     probe = Probe(jnp.asarray(config.tasks.families), unfitted, unfitted)
@@ -202,12 +200,12 @@ def update_inference(
 
 @eqx.filter_jit
 def update_policy(
-    policy: SACState, replay: Episodes, stored, config: MetaConfig, places: Places, key: PRNGKeyArray
+    policy: SACState, replay: Episodes, stored, config: MetaConfig, view: PolicyView, key: PRNGKeyArray
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """Steps of soft actor-critic on nominal episodes, with the beliefs held then as the policy sees them."""
 
     def batch_of(_: None, key: PRNGKeyArray) -> SACBatch:
-        return sample_transitions(replay, stored, config, places, key)
+        return sample_transitions(replay, stored, config, view, key)
 
     return sac.update_many(policy, batch_of, None, jax.random.split(key, config.policy_updates), config.sac)
 
@@ -244,7 +242,7 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
     )
 
 
-def sample_transitions(replay: Episodes, stored, config: MetaConfig, places: Places, key: PRNGKeyArray) -> SACBatch:
+def sample_transitions(replay: Episodes, stored, config: MetaConfig, view: PolicyView, key: PRNGKeyArray) -> SACBatch:
     """Decisions of nominal episodes, with the beliefs before and after."""
     group_key, episode_key, time_key = jax.random.split(key, 3)
     size = (config.sac.batch_size,)
@@ -254,7 +252,7 @@ def sample_transitions(replay: Episodes, stored, config: MetaConfig, places: Pla
 
     def observation(time):
         state, belief = jax.tree.map(lambda leaf: leaf[group, episode, time], (replay.state, replay.belief))
-        return policy_observation(state, belief, *config.policy_view, places)
+        return view(state, belief)
 
     return SACBatch(
         observation=observation(time),
