@@ -77,6 +77,13 @@ def test_early_slots_do_not_count():
     assert diagnosis_of(late, wrong).wrong_slots() == pytest.approx(10 / (2 * (TIME - 20)))
 
 
+def test_a_base_task_must_be_known_after_twenty_decisions():
+    found_at_last = episode_of()
+    for right_from, known in ((19, 1.0), (20, 0.5)):  # the first nineteen entries, or twenty, are wrong
+        late = replace(found_at_last, inferred_family=["velocity"] * right_from + ["goal"] * (TIME - right_from))
+        assert diagnosis_of(found_at_last, late).base_task_known() == known
+
+
 def test_every_agent_does_the_same_tasks(trial, tmp_path):
     told = []
     diagnosis = diagnose(trial, [TaskSpec("goal", 3.0), TaskSpec("goal", -2.0)], 1, told.append)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from rich.table import Table
 
+from rebody.evaluation.changes import base_task_right
 from rebody.evaluation.evaluate import Trial, evaluate
 from rebody.evaluation.results import EpisodeResult, Results
 from rebody.tasks import FAMILIES, Family
@@ -23,7 +24,7 @@ LADDER = {
 """Agents that differ by one part each, in the order in which parts are added."""
 PARTS = ("wrong base task", "wrong slot", "target read", "high level", "tracker")
 SLOT_FROM = 20
-"""Decisions after which a slot counts as right or wrong."""
+"""Decisions after which base task and slot count as right or wrong."""
 _LAST = round(LAST_S / DECISION_DT)
 
 
@@ -67,6 +68,10 @@ class Diagnosis:
         episodes = self.results["reuse"].episodes
         failed = [e for e in episodes if e.final_error > tolerance(e.active_family[-1])]
         return Counter(shares_of(episode).culprit for episode in failed)
+
+    def base_task_known(self) -> float:
+        """Share of episodes of `reuse` whose base task is read rightly once something is known."""
+        return float(np.mean([base_task_right(e)[SLOT_FROM - 1] for e in self.results["reuse"].episodes]))
 
     def wrong_slots(self) -> float:
         """Share of decisions of `reuse` whose subgoal is in another slot than the task's, once something is known."""
@@ -135,7 +140,10 @@ def _standing(diagnosis: Diagnosis) -> Table:
         right = (100 * np.mean([getattr(s, part) for s in of]) for part in ("base_task_right", "slot_right"))
         cells = [*(f"{value:.3f}" for value in medians), *(f"{value:.1f}" for value in right)]
         table.add_row(f"{family.name} \\[{family.unit}]", *cells)
-    table.caption = f"wrong slots after {SLOT_FROM} decisions: {100 * diagnosis.wrong_slots():.2f} %"
+    table.caption = (
+        f"after {SLOT_FROM} decisions: base task right in {100 * diagnosis.base_task_known():.1f} % of episodes, "
+        f"wrong slots from then on {100 * diagnosis.wrong_slots():.2f} %"
+    )
     return table
 
 
