@@ -32,10 +32,10 @@ def test_the_shipped_log(tmp_path, capsys):
     assert (out / "belief.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_of_an_evaluation_it_says_what_the_agent_believed(trained, tmp_path):
+def test_of_an_evaluation_it_says_what_the_agent_believed(own_module, tmp_path):
     tasks, results, log, out = (tmp_path / name for name in ("tasks.json", "results.json", "log.csv", "out"))
     tasks.write_text(json.dumps([{"family": "goal", "target": 2.0}]))
-    module = ["--inference", str(trained["inference"])]
+    module = ["--inference", str(own_module)]
     where = ["--robot", "point-mass", "--tasks", str(tasks), "--seconds", "3", "--json", str(results)]
     assert run(["evaluate", *module, *where]) == 0
     (episode,) = json.loads(results.read_text())["episodes"]

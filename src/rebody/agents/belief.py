@@ -17,7 +17,7 @@ from rebody.inference import Encoder, EncoderCarry
 from rebody.inference.mixture.padded import MixturePrior
 from rebody.inference.probe import Probe
 from rebody.tasks import FAMILIES
-from rebody.types import DECISION_DT, GLOBAL_FIELDS, RATE_OF, Belief, GlobalState, Transition
+from rebody.types import DECISION_DT, GLOBAL_FIELDS, RATE_OF, AnyArray, Belief, GlobalState, Transition
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def _global_state(fields: tuple[str, ...], given: Mapping[str, Any], previous: G
 def _velocity(field: str, known: Mapping[str, float], previous: GlobalState | None) -> float:
     """The displacement since the last decision over its time; nothing moved before the first."""
     position = RATE_OF.get(field)
-    if position not in known:
+    if position is None or position not in known:
         raise RebodyError(f"the state lacks '{field}': give {field}" + (f", or {position}." if position else "."))
     if previous is None:
         return 0.0
@@ -114,6 +114,6 @@ def _take_in(encoder: Encoder, memory: EncoderCarry, transition: Transition) -> 
 @eqx.filter_jit
 def _read(
     probe: Probe, mixture: MixturePrior | None, belief: Belief
-) -> tuple[Int[Array, ""], Float[Array, ""], Float[Array, " family"], Float[Array, " K"]]:
+) -> tuple[Int[Array, ""], Float[Array, ""], Float[Array, " family"], Float[AnyArray, " K"]]:
     shares = jnp.zeros(0) if mixture is None else mixture.shares(belief.mean)
     return *probe(belief), probe.probabilities(belief), shares

@@ -19,7 +19,7 @@ TaskReward = Callable[[Any, float, dict[str, Any]], float]
 """(observation, reward, info) -> the task's share of the reward: -|error|, without costs and bonuses."""
 
 
-class BeliefObservation(gymnasium.Wrapper):
+class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
     """Appends mean and standard deviation of the latent; they change once per decision of 0.1 s."""
 
     def __init__(
@@ -36,7 +36,9 @@ class BeliefObservation(gymnasium.Wrapper):
         As they are, `observe` and `task_reward` serve the environments of this package. RebodyError where steps do not
         divide a decision, or observations are no vector.
         """
-        super().__init__(env)
+        made_of = {"inference": inference, "control_dt": control_dt, "observe": observe, "task_reward": task_reward}
+        gymnasium.utils.RecordConstructorArgs.__init__(self, **made_of)
+        gymnasium.Wrapper.__init__(self, env)
         self._per_decision = round(DECISION_DT / control_dt)
         if self._per_decision < 1 or not np.isclose(self._per_decision * control_dt, DECISION_DT):
             raise RebodyError(f"steps of {control_dt:g} s do not divide a decision of {DECISION_DT} s.")
