@@ -13,6 +13,8 @@ from rebody.errors import RebodyError
 from rebody.evaluation.logs import believe, doubts, read_log, resample, save_beliefs
 from rebody.report import plot_beliefs
 
+TABLE, PICTURE = "belief.csv", "belief.png"
+
 
 @dataclass(frozen=True)
 class Infer:
@@ -26,10 +28,11 @@ class Infer:
     """Folder for belief.csv and belief.png."""
 
     def run(self) -> None:
-        """Read, listen, say what is believed at the end, write."""
-        check_output(self._table, "--out")
-        if self._table and self._table.resolve() == self.log.resolve():
-            raise RebodyError(f"--out {self.out} would write over the log. Choose another folder.")
+        """Read, listen, write, say what is believed at the end."""
+        if self.out is not None:
+            check_output(self.out / TABLE, "--out")
+            if (self.out / TABLE).resolve() == self.log.resolve():
+                raise RebodyError(f"--out {self.out} would write over the log. Choose another folder.")
         inference, console = load_inference(self.inference), Console(soft_wrap=True)
         fields = inference.contract.fields
         log = read_log(self.log, fields)
@@ -40,11 +43,7 @@ class Infer:
             console.print(f"[bold yellow]doubtful:[/] {doubt}", highlight=False)
         with console.status(f"{len(decisions.reward)} decisions"):
             run = believe(inference, decisions)
-        if self.out is not None and self._table is not None:
-            save_beliefs(run, self._table)
-            plot_beliefs(run, self.out / "belief.png")
+        if self.out is not None:
+            save_beliefs(run, self.out / TABLE)
+            plot_beliefs(run, self.out / PICTURE)
         console.print(f"{inference.name} {run.conclusion()}", highlight=False)
-
-    @property
-    def _table(self) -> Path | None:
-        return None if self.out is None else self.out / "belief.csv"
