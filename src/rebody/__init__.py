@@ -1,5 +1,6 @@
 """rebody: learn to infer a task once, on a point mass; reuse that module, frozen, on any robot."""
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rebody.envs import register_environments
@@ -7,17 +8,19 @@ from rebody.errors import RebodyError
 
 if TYPE_CHECKING:
     from rebody.agents.live import load_agent
+    from rebody.agents.parts import load_inference
 
 __version__ = "0.1.0"
-__all__ = ["RebodyError", "load_agent"]
+__all__ = ["RebodyError", "load_agent", "load_inference"]
 
 register_environments()
 
 
-def __getattr__(name: str) -> Any:
-    """`load_agent` brings JAX with it, which `import rebody` alone shall not."""
-    if name == "load_agent":
-        from rebody.agents.live import load_agent
+_LOADERS = {"load_agent": "rebody.agents.live", "load_inference": "rebody.agents.parts"}
 
-        return load_agent
+
+def __getattr__(name: str) -> Any:
+    """Loaders bring JAX with them, which `import rebody` alone shall not."""
+    if name in _LOADERS:
+        return getattr(import_module(_LOADERS[name]), name)
     raise AttributeError(f"module 'rebody' has no attribute '{name}'")

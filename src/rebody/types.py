@@ -18,6 +18,8 @@ AnyArray = jax.Array | np.ndarray
 Tree = TypeVar("Tree")
 
 GLOBAL_FIELDS = ("x", "y", "z", "pitch", "vx", "vy", "vz", "pitch_rate")
+RATE_OF = {"vx": "x", "vy": "y", "vz": "z", "pitch_rate": "pitch"}
+"""Fields that are displacements over a decision, and what is displaced."""
 
 
 class GlobalState(eqx.Module):

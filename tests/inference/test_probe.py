@@ -35,3 +35,6 @@ def test_tells_families_apart_and_reads_each_by_its_own_map():
     families, targets = probe(belief(latent[300:]))
     np.testing.assert_array_equal(families, family[300:])
     np.testing.assert_allclose(targets, target[300:], atol=1e-3)
+    probabilities = np.asarray(probe.probabilities(belief(latent[300:])))
+    np.testing.assert_allclose(probabilities.sum(axis=-1), 1.0, atol=1e-5)
+    np.testing.assert_array_equal(probe.families[probabilities.argmax(axis=-1)], families)

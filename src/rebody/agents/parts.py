@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Int
 
+from rebody.agents.belief import LiveBelief
 from rebody.agents.slots import SlotClassifier
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import Toy, make_toy
@@ -52,6 +53,15 @@ class Inference:
     def task_code(self) -> TaskCode:
         """How a task is put to the policy that is told it."""
         return task_code(self.contract.target_ranges)
+
+    def begin(self, state: Mapping[str, Any]) -> LiveBelief:
+        """The belief about a task that begins in this state: its `update` takes in every decision of 0.1 s.
+
+        `state` holds the fields of the contract (m, rad, m/s, rad/s) as `LiveBelief.update` has them. RebodyError if
+        the module hears of a body at other times, or a field is missing.
+        """
+        self.contract.check_time()
+        return LiveBelief(self.parts.module.encoder, self.parts.probe, self.parts.mixture, state)
 
 
 @dataclass(frozen=True)

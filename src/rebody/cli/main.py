@@ -44,6 +44,7 @@ def parse(arguments: list[str]) -> Any:
     from rebody.cli.diagnose import Diagnose
     from rebody.cli.evaluate import Evaluate
     from rebody.cli.figure import Figures
+    from rebody.cli.infer import Infer
     from rebody.cli.listing import List
     from rebody.cli.robot import Robot
     from rebody.cli.run import RunTask
@@ -56,6 +57,7 @@ def parse(arguments: list[str]) -> Any:
         | Annotated[RunTask, tyro.conf.subcommand("run")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
         | Annotated[Diagnose, tyro.conf.subcommand("diagnose")]
+        | Annotated[Infer, tyro.conf.subcommand("infer")]
         | train
         | Annotated[Figures, tyro.conf.subcommand("figure")]
         | Annotated[Robot, tyro.conf.subcommand("robot")]

@@ -1,6 +1,13 @@
 """Gymnasium environments that hide their task from the observation. Importing this is cheap."""
 
+from typing import TYPE_CHECKING, Any
+
 import gymnasium
+
+if TYPE_CHECKING:
+    from rebody.envs.belief import BeliefObservation
+
+__all__ = ["BeliefObservation", "register_environments"]
 
 _ROBOTS = {"HalfCheetah": ("cheetah", 0.05), "Hopper": ("hopper", 0.02), "Walker2d": ("walker", 0.02)}
 """What Gymnasium calls a robot: its name here, and its control step [s]."""
@@ -28,3 +35,12 @@ def _register(name: str, kind: str, step_s: float, settings: dict[str, str]) -> 
         kwargs=settings,
         max_episode_steps=round(_SECONDS / step_s),
     )
+
+
+def __getattr__(name: str) -> Any:
+    """`BeliefObservation` brings JAX with it."""
+    if name == "BeliefObservation":
+        from rebody.envs.belief import BeliefObservation
+
+        return BeliefObservation
+    raise AttributeError(f"module 'rebody.envs' has no attribute '{name}'")

@@ -1,7 +1,6 @@
 """What an evaluation leaves behind: the versioned JSON that others read."""
 
 import json
-import os
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +11,7 @@ from jaxtyping import Float, Int
 
 from rebody.agents.rollout import Episodes
 from rebody.evaluation.summary import summarise
+from rebody.store.files import written_whole
 from rebody.tasks import FAMILIES
 from rebody.tasks.figures import final_error, final_squared_error, ripple
 from rebody.tasks.task_file import TaskSpec
@@ -105,13 +105,8 @@ class Results:
 
 def save_results(results: Results, path: Path) -> None:
     """Write the JSON, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.new")
-    try:
+    with written_whole(path) as unfinished:
         unfinished.write_text(json.dumps(results.to_json(), allow_nan=False))
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def episode_results(

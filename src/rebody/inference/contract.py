@@ -31,17 +31,25 @@ class Contract:
         """Indices of the families that the module can tell apart, ascending."""
         return tuple(sorted(family_index(name) for name in self.target_ranges))
 
+    def check_time(self) -> None:
+        """RebodyError if the module does not hear of a body as often as this release decides."""
+        if problems := self._problems_of_time():
+            raise RebodyError(f"the inference module does not fit: {problems[0]}.")
+
     def check_body(self, name: str, moving_fields: tuple[str, ...], slots: tuple[str, ...]) -> None:
         """RebodyError with all that does not fit a body that moves these fields and follows these slots."""
-        problems = []
-        if self.decision_dt != DECISION_DT:
-            problems.append(f"it expects a decision every {self.decision_dt:g} s, here one takes {DECISION_DT} s")
+        problems = self._problems_of_time()
         if missing := [field for field in self.fields if field not in moving_fields]:
             problems.append(f"its encoder sees {', '.join(missing)}, which '{name}' does not have")
         if missing := [family for family in self.target_ranges if family not in slots]:
             problems.append(f"the tracker has no slot for {', '.join(missing)} (it has {', '.join(slots)})")
         if problems:
             raise RebodyError(f"the inference module does not fit '{name}': {'; '.join(problems)}.")
+
+    def _problems_of_time(self) -> list[str]:
+        if self.decision_dt == DECISION_DT:
+            return []
+        return [f"it expects a decision every {self.decision_dt:g} s, here one takes {DECISION_DT} s"]
 
     def to_config(self) -> dict[str, Any]:
         """For config.json."""

@@ -1,6 +1,7 @@
 """A probe: what can be read linearly from a belief. Fitted after training, never used by `reuse`."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.optimize
@@ -21,10 +22,17 @@ class Probe(eqx.Module):
 
     def __call__(self, belief: Belief) -> tuple[Int[Array, "*batch"], Float[Array, "*batch"]]:
         """Family (its index in `rebody.tasks.FAMILIES`) and target [m, m/s, rad] of each belief."""
-        features = _with_one(jnp, belief.mean)
-        which = jnp.argmax(features @ self.family_weights, axis=-1)
-        targets = jnp.take_along_axis(features @ self.target_weights, which[..., None], axis=-1)[..., 0]
+        which = jnp.argmax(self._logits(belief), axis=-1)
+        of_each = _with_one(jnp, belief.mean) @ self.target_weights
+        targets = jnp.take_along_axis(of_each, which[..., None], axis=-1)[..., 0]
         return jnp.asarray(self.families)[which], targets
+
+    def probabilities(self, belief: Belief) -> Float[Array, "*batch family"]:
+        """Of each family, in the order of `families`."""
+        return jax.nn.softmax(self._logits(belief), axis=-1)
+
+    def _logits(self, belief: Belief) -> Float[Array, "*batch family"]:
+        return _with_one(jnp, belief.mean) @ self.family_weights
 
 
 def fit_probe(

@@ -38,9 +38,13 @@ class MixturePrior(eqx.Module):
         # a large number, not infinity: with padding only, nothing may become NaN
         return self.active * jax.nn.softmax(jnp.where(self.active, log_rho, -1e30), axis=-1)
 
+    def shares(self, latent: Float[AnyArray, "*batch latent"]) -> Float[AnyArray, "*batch K"]:
+        """Responsibilities for each latent, by the dimensions that are clustered: the first."""
+        return self.responsibilities(latent[..., : self.mean.shape[-1]])
+
     def component(self, latent: Float[AnyArray, "*batch latent"]) -> Int[AnyArray, "*batch"]:
-        """The likeliest component of each latent, by the dimensions that are clustered: the first."""
-        return jnp.argmax(self.responsibilities(latent[..., : self.mean.shape[-1]]), axis=-1)
+        """The likeliest component of each latent."""
+        return jnp.argmax(self.shares(latent), axis=-1)
 
     def divergences(self, belief: Belief) -> Float[AnyArray, "*batch K"]:
         """KL to each component's expected Gaussian [nats]; zero for padding."""

@@ -1,0 +1,81 @@
+"""Anybody's environment, with a frozen module's belief about the task beside its observation."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from jaxtyping import Float
+
+from rebody.agents.belief import Reading
+from rebody.agents.parts import load_inference
+from rebody.errors import RebodyError
+from rebody.types import DECISION_DT
+
+Observe = Callable[[Any, dict[str, Any]], Mapping[str, Any]]
+"""(observation, info) -> the fields that the module sees, as `LiveBelief.update` has them."""
+TaskReward = Callable[[Any, float, dict[str, Any]], float]
+"""(observation, reward, info) -> the task's share of the reward: -|error|, without costs and bonuses."""
+
+
+class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
+    """Appends mean and standard deviation of the latent; they change once per decision of 0.1 s."""
+
+    def __init__(
+        self,
+        env: gymnasium.Env,
+        inference: str = "goal-velocity",
+        *,
+        control_dt: float,
+        observe: Observe = lambda observation, info: info,
+        task_reward: TaskReward = lambda observation, reward, info: reward,
+    ):
+        """`control_dt` is what a step of the environment lasts [s]; `inference` a shipped name or a folder.
+
+        As they are, `observe` and `task_reward` serve the environments of this package. RebodyError where steps do not
+        divide a decision, or observations are no vector.
+        """
+        made_of = {"inference": inference, "control_dt": control_dt, "observe": observe, "task_reward": task_reward}
+        gymnasium.utils.RecordConstructorArgs.__init__(self, **made_of)
+        gymnasium.Wrapper.__init__(self, env)
+        self._per_decision = round(DECISION_DT / control_dt)
+        if self._per_decision < 1 or not np.isclose(self._per_decision * control_dt, DECISION_DT):
+            raise RebodyError(f"steps of {control_dt:g} s do not divide a decision of {DECISION_DT} s.")
+        if not isinstance(env.observation_space, spaces.Box) or len(env.observation_space.shape) != 1:
+            raise RebodyError(f"observations must be a vector, not {env.observation_space}; flatten them first.")
+        self._inference = load_inference(inference)
+        self._observe, self._task_reward = observe, task_reward
+        self.observation_space = _with_belief(env.observation_space, self._inference.parts.module.encoder.latent)
+
+    @property
+    def reading(self) -> Reading:
+        """What is believed now."""
+        return self._belief.reading
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+        """Start anew and forget."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._belief = self._inference.begin(self._observe(observation, info))
+        self._rewards: list[float] = []
+        return self._beside(observation), info
+
+    def step(self, action: Any):
+        """One step; the last of each decision changes the belief, which hears the mean reward."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self._rewards.append(float(self._task_reward(observation, float(reward), info)))
+        if len(self._rewards) == self._per_decision:
+            self._belief.update(self._observe(observation, info), float(np.mean(self._rewards)))
+            self._rewards = []
+        return self._beside(observation), reward, terminated, truncated, info
+
+    def _beside(self, observation: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n_and_twice_latent"]:
+        both = [observation, np.asarray(self.reading.latent.features())]
+        return np.concatenate(both).astype(self.observation_space.dtype)
+
+
+def _with_belief(space: spaces.Box, latent: int) -> spaces.Box:
+    mean, deviation = np.full(latent, -np.inf), np.zeros(latent)
+    low, high = np.concatenate([space.low, mean, deviation]), np.concatenate([space.high, np.full(2 * latent, np.inf)])
+    dtype = np.result_type(space.dtype, np.float32)
+    return spaces.Box(low.astype(dtype), high.astype(dtype), dtype=dtype.type)

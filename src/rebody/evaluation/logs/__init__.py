@@ -1,0 +1,8 @@
+"""Runs that somebody logged: read, resampled to decisions, and what a frozen module believes over them."""
+
+from rebody.evaluation.logs.belief import BeliefOverTime, believe, save_beliefs
+from rebody.evaluation.logs.doubts import doubts
+from rebody.evaluation.logs.file import COLUMNS, Log, read_log
+from rebody.evaluation.logs.resample import Decisions, resample
+
+__all__ = ["COLUMNS", "BeliefOverTime", "Decisions", "Log", "believe", "doubts", "read_log", "resample", "save_beliefs"]

@@ -1,0 +1,108 @@
+"""What a frozen module believes over a logged run."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from rebody.agents.belief import Reading
+from rebody.agents.parts import Inference
+from rebody.evaluation.logs.file import COLUMNS, REWARD, TIME
+from rebody.evaluation.logs.resample import Decisions
+from rebody.store.files import written_whole
+from rebody.tasks import FAMILIES
+
+
+@dataclass(frozen=True)
+class BeliefOverTime:
+    """A run and what was believed after each of its decisions."""
+
+    inference: str
+    decisions: Decisions
+    readings: list[Reading]
+
+    @property
+    def time_s(self) -> Float[np.ndarray, " decision"]:
+        """When each decision ended."""
+        return self.decisions.time_s[1:]
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """Those that the module knows."""
+        return tuple(self.readings[-1].probabilities)
+
+    @property
+    def targets(self) -> Float[np.ndarray, " decision"]:
+        """What was read, in the unit of the family that was believed [m, m/s, rad]."""
+        return np.array([reading.target for reading in self.readings])
+
+    @property
+    def latent(self) -> Float[np.ndarray, "decision latent"]:
+        """Mean of the latent."""
+        return np.stack([reading.latent.mean for reading in self.readings])
+
+    @property
+    def clusters(self) -> Float[np.ndarray, "decision K"]:
+        """Responsibilities of the mixture's clusters; none where there is no mixture."""
+        return np.array([list(reading.responsibilities.values()) for reading in self.readings])
+
+    def believes(self, family: str) -> np.ndarray:
+        """Whether the family was the likeliest, at each decision."""
+        return np.array([reading.family == family for reading in self.readings])
+
+    def conclusion(self) -> str:
+        """What is believed at the end, and since when."""
+        last = self.readings[-1]
+        family = next(family for family in FAMILIES if family.name == last.family)
+        is_same = self.believes(last.family)
+        is_close = is_same & (np.abs(self.targets - last.target) <= family.tolerance)
+        return (
+            f"believes at {self.time_s[-1]:.1f} s: {last.family} {last.target:.2f} {family.unit}, "
+            f"{last.family} with probability {last.probabilities[last.family]:.2f}; {last.family} since "
+            f"{self._since(is_same):.1f} s, within {family.tolerance:g} {family.unit} of that since "
+            f"{self._since(is_close):.1f} s"
+        )
+
+    def _since(self, holds: np.ndarray) -> float:
+        """From when on something has held without a break [s]; it holds at the end."""
+        broken = np.flatnonzero(~holds)
+        return float(self.time_s[broken[-1] + 1 if broken.size else 0])
+
+
+def believe(inference: Inference, decisions: Decisions) -> BeliefOverTime:
+    """Let a module hear a run, decision by decision."""
+    states = [dict(zip(decisions.fields, at, strict=True)) for at in zip(*decisions.fields.values(), strict=True)]
+    belief = inference.begin(states[0])
+    readings = [belief.update(*heard) for heard in zip(states[1:], decisions.reward, strict=True)]
+    return BeliefOverTime(inference.name, decisions, readings)
+
+
+def save_beliefs(run: BeliefOverTime, path: Path) -> None:
+    """A CSV with a row per decision: what was heard, then what was believed."""
+    decisions = run.decisions
+    heard = {COLUMNS[field]: values[1:] for field, values in decisions.fields.items()} | {REWARD: decisions.reward}
+    with written_whole(path) as unfinished, unfinished.open("w", newline="") as file:
+        rows = [
+            {TIME: run.time_s[i]} | {name: values[i] for name, values in heard.items()} | _row(reading)
+            for i, reading in enumerate(run.readings)
+        ]
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows({name: _plain(value) for name, value in row.items()} for row in rows)
+
+
+def _row(reading: Reading) -> dict[str, Any]:
+    return {
+        "inferred_family": reading.family,
+        "inferred_target": reading.target,
+        **{f"probability_{family}": p for family, p in reading.probabilities.items()},
+        **{f"cluster_{k}": share for k, share in reading.responsibilities.items()},
+        **{f"latent_{i + 1}": value for i, value in enumerate(reading.latent.mean)},
+    }
+
+
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, str) else round(float(value), 6)

@@ -1,0 +1,97 @@
+"""The picture of a belief over a logged run."""
+
+from itertools import cycle
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from rebody.evaluation.logs import COLUMNS, BeliefOverTime
+from rebody.report.figures import FAMILY_COLOURS
+from rebody.report.style import TRUTH, figure
+from rebody.tasks import FAMILIES, Family
+
+OUTLIERS = 5
+"""Percentage of believed targets, at either end, that do not stretch an axis: first guesses may lie anywhere."""
+
+
+def plot_beliefs(run: BeliefOverTime, path: Path) -> None:
+    """Left, over time: the robot and the believed targets, the reward, how sure the module is of the family. Right:
+    the latent's path, and the mixture's clusters where there are any.
+    """
+    known = [family for family in FAMILIES if family.name in run.families]
+    rows = len(known) + 2
+    with figure(path, rows, 2, size=(11.5, 1.9 * rows), width_ratios=(2.0, 1.0)) as (drawing, panels):
+        over_time, right = panels[0::2], panels[1::2]
+        for panel, family in zip(over_time, known, strict=False):
+            _reached(panel, run, family)
+        _reward(over_time[-2], run)
+        _probabilities(over_time[-1], run)
+        for panel in over_time:
+            panel.set(xlim=(run.decisions.time_s[0], run.time_s[-1]))
+        for panel in over_time[:-1]:
+            panel.tick_params(labelbottom=False)
+        grid = right[0].get_gridspec()
+        for panel in right:
+            panel.remove()
+        split = rows if run.clusters.shape[1] == 0 else (rows + 1) // 2
+        _latent(drawing.add_subplot(grid[:split, 1]), run)
+        if split < rows:
+            _clusters(drawing.add_subplot(grid[split:, 1]), run)
+        drawing.suptitle(f"What '{run.inference}' believes, from states and rewards alone")
+
+
+def _reached(axes: Axes, run: BeliefOverTime, family: Family) -> None:
+    is_believed = run.believes(family.name)
+    reached = run.decisions.fields.get(family.field, np.zeros(0))  # a module may hear of it by the reward alone
+    believed = run.targets[is_believed]
+    axes.plot(run.time_s[is_believed], believed, ".", color=_colour(family.name), label=f"believed {family.name}")
+    if reached.size:
+        axes.plot(run.decisions.time_s, reached, color=TRUTH, lw=1.2, label="robot")
+    usual = np.percentile(believed, (OUTLIERS, 100 - OUTLIERS)) if believed.size else []
+    shown = [*reached, *usual, 0.0]
+    margin = 0.1 * max(np.ptp(shown), family.tolerance)
+    axes.set(ylabel=COLUMNS[family.field], ylim=(min(shown) - margin, max(shown) + margin))
+    axes.legend(frameon=False, fontsize=8, loc="upper right")
+
+
+def _reward(axes: Axes, run: BeliefOverTime) -> None:
+    axes.plot(run.time_s, run.decisions.reward, color=TRUTH, lw=1.2)
+    axes.set(ylabel="reward")
+
+
+def _probabilities(axes: Axes, run: BeliefOverTime) -> None:
+    for family in run.families:
+        shares = [reading.probabilities[family] for reading in run.readings]
+        axes.plot(run.time_s, shares, color=_colour(family), label=family)
+    axes.set(ylabel="probability", ylim=(-0.03, 1.03), xlabel="time [s]")
+    axes.legend(frameon=False, fontsize=8, loc="center right")
+
+
+def _latent(axes: Axes, run: BeliefOverTime) -> None:
+    """Its first two numbers; a latent of one number over time."""
+    latent = run.latent
+    is_plane = latent.shape[1] > 1
+    across, up = (latent[:, 0], latent[:, 1]) if is_plane else (run.time_s, latent[:, 0])
+    axes.plot(across, up, color=TRUTH, lw=0.5, alpha=0.4)
+    for family in run.families:
+        of = run.believes(family)
+        axes.plot(across[of], up[of], ".", color=_colour(family), label=f"believed: {family}")
+    axes.plot(across[-1], up[-1], "o", color=TRUTH, mfc="none", ms=9, label="at the end")
+    axes.set(
+        xlabel="latent 1" if is_plane else "time [s]", ylabel="latent 2" if is_plane else "latent", title="the latent"
+    )
+    axes.legend(frameon=False, fontsize=8)
+
+
+def _clusters(axes: Axes, run: BeliefOverTime) -> None:
+    lines = cycle(("-", "--", "-.", ":"))  # families have the colours, and nobody told the clusters of families
+    for k, shares in zip(run.readings[-1].responsibilities, run.clusters.T, strict=True):
+        if shares.max() > 0.5:  # of many, those that it ever belonged to
+            axes.plot(run.time_s, shares, next(lines), color=TRUTH, label=f"cluster {k}")
+    axes.set(xlabel="time [s]", ylabel="responsibility", ylim=(-0.03, 1.03), title="clusters found without labels")
+    axes.legend(frameon=False, fontsize=8, loc="center right")
+
+
+def _colour(family: str) -> str:
+    return dict(zip((known.name for known in FAMILIES), FAMILY_COLOURS, strict=True))[family]

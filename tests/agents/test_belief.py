@@ -1,0 +1,109 @@
+"""A belief that is told state and reward from outside is the agent's own."""
+
+import equinox as eqx
+import jax
+import numpy as np
+import pytest
+
+import rebody
+from rebody.agents.build import build_agent
+from rebody.agents.parts import Inference, inference_template
+from rebody.agents.rollout import rollout_on_toy
+from rebody.bodies.toys import MassDamper
+from rebody.errors import RebodyError
+from rebody.inference.contract import Contract
+from rebody.tasks import GOAL
+from rebody.types import Task
+
+DECISIONS = 9
+
+
+def module_of(stored_config, *fields, **contract):
+    """An untrained module that sees these fields."""
+    config = stored_config | {
+        "inference": stored_config["inference"] | {"fields": fields, "scales": (1.0,) * len(fields)},
+        "contract": stored_config["contract"] | {"fields": fields} | contract,
+    }
+    parts = eqx.filter_jit(lambda: inference_template(config))()
+    return Inference("untrained", Contract.from_config(config["contract"]), parts, MassDamper())
+
+
+@pytest.fixture(scope="module")
+def episodes(inference):
+    target = np.full((DECISIONS, 1), 4.0, np.float32)
+    task = Task(np.full(target.shape, GOAL, np.int32), target)
+    agent = build_agent("reuse", inference, horizon=2)
+    episodes = rollout_on_toy(agent, inference.toy, task, "plain")
+    return jax.tree.map(lambda leaf: np.asarray(leaf)[:, 0], (episodes.state, episodes.reward, episodes.belief))
+
+
+def test_believes_what_the_agent_did(inference, episodes):
+    belief, (state, reward, of_agent) = inference.begin({"x": 0.0}), episodes
+    for i in range(DECISIONS):
+        reading = belief.update({"x": state.x[i]}, reward[i])
+        assert reading is belief.reading
+        np.testing.assert_allclose(reading.latent.mean, of_agent.mean[i], atol=1e-5)
+        np.testing.assert_allclose(reading.latent.variance, of_agent.variance[i], atol=1e-5)
+    assert (reading.family, reading.probabilities, reading.responsibilities) == ("goal", {"goal": 1.0}, {})
+    assert reading.target == pytest.approx(of_agent.mean[-1] @ [2.0, -1.0] + 0.5, abs=1e-4)
+
+
+def test_knows_nothing_at_the_beginning_and_each_is_its_own(inference):
+    one, other = inference.begin({"x": 0.0}), inference.begin({"x": 0.0})
+    one.update({"x": 0.1}, -3.0)
+    np.testing.assert_array_equal(other.reading.latent.mean, np.zeros(2))
+    np.testing.assert_array_equal(other.reading.latent.variance, np.ones(2))
+
+
+@pytest.mark.parametrize(("position", "rate"), [("x", "vx"), ("z", "vz"), ("pitch", "pitch_rate")])
+def test_a_velocity_that_is_left_out_is_the_displacement(position, rate, stored_config):
+    module = module_of(stored_config, position, rate)
+    told, left_out = module.begin({position: 0.2, rate: 0.0}), module.begin({position: 0.2})
+    for before, now in ((0.2, 0.3), (0.3, 0.25), (0.25, 0.25)):
+        of_told = told.update({position: now, rate: 10 * (now - before)}, -1.0)
+        of_left_out = left_out.update({position: now, "family": "goal"}, -1.0)
+        np.testing.assert_allclose(of_left_out.latent.mean, of_told.latent.mean, atol=1e-5)
+    assert np.abs(of_told.latent.mean).max() > 0
+
+
+def test_a_pitch_may_go_round(stored_config):
+    module = module_of(stored_config, "pitch", "pitch_rate")
+    wrapped, unwrapped = module.begin({"pitch": 3.1}), module.begin({"pitch": 3.1})
+    wrapped, unwrapped = wrapped.update({"pitch": 3.2 - 2 * np.pi}, -1.0), unwrapped.update({"pitch": 3.2}, -1.0)
+    np.testing.assert_allclose(wrapped.latent.mean, unwrapped.latent.mean, atol=1e-5)
+
+
+def test_of_several_families_and_clusters():
+    belief = rebody.load_inference("goal-velocity").begin({"x": 0.0})
+    for i in range(1, 20):
+        reading = belief.update({"x": 0.1 * i}, -abs(0.1 * i - 6.0) / 6.0)
+    assert reading.family == "goal"
+    assert reading.target == pytest.approx(6.0, abs=0.5)
+    assert reading.probabilities.keys() == {"goal", "velocity"}
+    assert reading.probabilities["goal"] > 0.9
+    assert sum(reading.probabilities.values()) == pytest.approx(1.0, abs=1e-4)
+    assert sum(reading.responsibilities.values()) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("state", "reward", "says"),
+    [
+        ({"x": 0.1}, 0.5, r"reward 0\.5 cannot be"),
+        ({"x": 0.1}, float("nan"), "reward nan cannot be"),
+        ({"x": float("inf")}, -1.0, "'x' is inf"),
+        ({"vx": 1.0}, -1.0, "lacks 'x': give x"),
+    ],
+)
+def test_what_cannot_be_is_refused(state, reward, says, inference):
+    with pytest.raises(RebodyError, match=says):
+        inference.begin({"x": 0.0}).update(state, reward)
+
+
+def test_a_velocity_needs_itself_or_its_position(stored_config):
+    with pytest.raises(RebodyError, match="lacks 'vx': give vx, or x"):
+        module_of(stored_config, "vx").begin({"z": 0.0})
+
+
+def test_a_module_of_another_time_is_refused(stored_config):
+    with pytest.raises(RebodyError, match=r"every 0\.05 s, here one takes 0\.1 s"):
+        module_of(stored_config, "x", decision_dt=0.05).begin({"x": 0.0})

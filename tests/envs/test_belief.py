@@ -1,0 +1,96 @@
+"""A belief beside anybody's observation."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from rebody.agents.parts import load_inference
+from rebody.envs import BeliefObservation
+from rebody.errors import RebodyError
+
+POINT_MASS, CHEETAH = ("rebody/PointMass-v0", 0.1), ("rebody/HalfCheetah-v0", 0.05)
+NO_BOUNDS = "ignore:.*A Box observation space m(in|ax)imum value is:UserWarning"
+
+
+def believing(name, control_dt, inference="goal-velocity", **functions):
+    return BeliefObservation(gymnasium.make(name), inference, control_dt=control_dt, **functions)
+
+
+@pytest.mark.filterwarnings(NO_BOUNDS)
+@pytest.mark.filterwarnings("ignore:.*different from the unwrapped version:UserWarning")
+@pytest.mark.parametrize("of", [POINT_MASS, CHEETAH])
+def test_gymnasiums_own_checks(of):
+    check_env(believing(*of), skip_render_check=True)
+
+
+def test_the_belief_is_that_of_decisions_told_one_by_one():
+    env, module = believing(*CHEETAH), load_inference("goal-velocity")
+    observation, info = env.reset(seed=0, options={"family": "goal", "target": 5.0})
+    belief, heard = module.begin(info), []
+    for step in range(1, 9):
+        plain, reward, _, _, info = env.step(env.action_space.sample())
+        heard.append(reward)
+        if step % 2 == 0:
+            belief.update(info, np.mean(heard[-2:]))
+        np.testing.assert_allclose(plain[18:], belief.reading.latent.features(), atol=1e-6)
+    assert observation.shape == plain.shape == env.observation_space.shape == (18 + 12,)
+    assert env.reading.family == belief.reading.family
+
+
+def test_a_reset_forgets():
+    env = believing(*CHEETAH)
+    first, _ = env.reset(seed=0)
+    for _ in range(3):  # to the midst of a decision
+        moved, *_ = env.step(np.zeros(6))
+    assert not np.array_equal(moved[18:], first[18:])
+    np.testing.assert_array_equal(env.reset(seed=0)[0], first)
+    early, *_ = env.step(np.zeros(6))
+    np.testing.assert_array_equal(early[18:], first[18:])  # a decision takes two steps again
+    late, *_ = env.step(np.zeros(6))
+    assert not np.array_equal(late[18:], first[18:])
+
+
+def test_somebody_elses_environment():
+    """It names its states otherwise, and pays for something else."""
+    env = BeliefObservation(
+        gymnasium.make("CartPole-v1"),
+        "position",
+        control_dt=0.02,
+        observe=lambda observation, info: {"x": observation[0]},
+        task_reward=lambda observation, reward, info: -abs(observation[0] - 2.0),
+    )
+    observation, _ = env.reset(seed=0)
+    assert observation.dtype == env.observation_space.dtype == np.float32
+    for step in range(1, 6):
+        observation, reward, *_ = env.step(step % 2)
+        assert reward == 1.0
+        assert np.array_equal(observation[4:], np.repeat([0.0, 1.0], 2)) == (step < 5)
+    assert env.observation_space.contains(observation)
+
+
+def test_a_reward_that_no_task_gives_is_refused():
+    env = BeliefObservation(
+        gymnasium.make("CartPole-v1"), "position", control_dt=0.1, observe=lambda observation, info: {"x": 0.0}
+    )
+    env.reset(seed=0)
+    with pytest.raises(RebodyError, match="reward 1 cannot be"):
+        env.step(0)
+
+
+@pytest.mark.parametrize("control_dt", [0.03, 0.2, 0.008])
+def test_steps_must_divide_a_decision(control_dt):
+    with pytest.raises(RebodyError, match=f"steps of {control_dt} s do not divide"):
+        believing("rebody/PointMass-v0", control_dt)
+
+
+def test_observations_must_be_a_vector():
+    with pytest.raises(RebodyError, match="must be a vector, not Discrete"):
+        believing("FrozenLake-v1", 0.1)
+
+
+def test_stable_baselines3_trains_on_it():
+    sb3 = pytest.importorskip("stable_baselines3")
+    model = sb3.PPO("MlpPolicy", believing(*POINT_MASS), n_steps=64, batch_size=32, n_epochs=1, device="cpu")
+    model.learn(256)
+    assert model.num_timesteps == 256

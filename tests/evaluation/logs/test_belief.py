@@ -1,0 +1,110 @@
+"""What is believed over a log of a run is what the agent believed in it."""
+
+import csv
+
+import jax
+import numpy as np
+import pytest
+
+from rebody.agents.build import build_agent
+from rebody.agents.parts import load_inference
+from rebody.agents.rollout import rollout_on_toy
+from rebody.evaluation.logs import believe, read_log, resample, save_beliefs
+from rebody.tasks import FAMILIES, GOAL, VELOCITY
+from rebody.types import Task
+
+DECISIONS = 60
+
+
+@pytest.fixture(scope="module")
+def module():
+    return load_inference("goal-velocity")
+
+
+@pytest.fixture(scope="module")
+def episodes(module):
+    """A point mass whose task changes half-way."""
+    late = np.arange(DECISIONS)[:, None] >= DECISIONS // 2
+    task = Task(np.where(late, VELOCITY, GOAL).astype(np.int32), np.where(late, -2.0, 5.0).astype(np.float32))
+    agent = build_agent("reuse", module, horizon=2)
+    episodes = rollout_on_toy(agent, module.toy, task, module.contract.reward)
+    return jax.tree.map(lambda leaf: np.asarray(leaf)[:, 0], (episodes.state, episodes.reward, episodes.belief))
+
+
+@pytest.fixture
+def believed(module, write):
+    """A function: columns -> beliefs over a log that holds them."""
+
+    def believed(**columns):
+        fields = module.contract.fields
+        return believe(module, resample(read_log(write(**columns), fields), fields))
+
+    return believed
+
+
+def columns_of(episodes):
+    """As logged from the start, at x = 0 at rest."""
+    state, reward, _ = episodes
+    return {
+        "time_s": 0.1 * np.arange(DECISIONS + 1),
+        "position_m": np.append(0.0, state.x.astype(float)),
+        "velocity_m_s": np.append(0.0, state.vx.astype(float)),
+        "reward": np.append(0.0, reward.astype(float)),
+    }
+
+
+def assert_as_the_agent(run, module, episodes):
+    _, _, of_agent = episodes
+    family, target = module.parts.probe(of_agent)
+    np.testing.assert_allclose(run.latent, of_agent.mean, atol=2e-3)
+    np.testing.assert_allclose(run.targets, target, atol=2e-3)
+    assert [reading.family for reading in run.readings] == [FAMILIES[i].name for i in np.asarray(family)]
+
+
+def test_of_a_log_with_a_row_per_decision(believed, module, episodes):
+    run = believed(**columns_of(episodes))
+    np.testing.assert_allclose(run.time_s, 0.1 * np.arange(1, DECISIONS + 1), atol=1e-9)
+    assert_as_the_agent(run, module, episodes)
+
+
+def test_of_a_finer_log(believed, module, episodes):
+    """Rows between the decisions: positions along the way, and the reward that the decision is paid."""
+    coarse = columns_of(episodes)
+    time = 0.02 * np.arange(5 * DECISIONS + 1)
+    decision = np.minimum(np.arange(5 * DECISIONS + 1) // 5 + 1, DECISIONS)  # that a moment belongs to
+    decision[5::5] -= 1
+    fine = {"time_s": time, "position_m": np.interp(time, coarse["time_s"], coarse["position_m"])}
+    fine |= {name: coarse[name][decision] for name in ("velocity_m_s", "reward")}
+    fine["velocity_m_s"][0] = 0.0
+    assert_as_the_agent(believed(**fine), module, episodes)
+
+
+def test_finds_the_tasks_and_when_they_changed(believed, episodes):
+    run = believed(**columns_of(episodes))
+    assert run.families == ("goal", "velocity")
+    assert run.believes("goal")[15:29].all()
+    assert run.targets[25] == pytest.approx(5.0, abs=0.25)
+    conclusion = run.conclusion()
+    assert conclusion.startswith("believes at 6.0 s: velocity -")
+    since = float(conclusion.split("velocity since ")[1].split()[0])
+    assert 3.0 < since < 4.5
+
+
+def test_the_table_holds_what_was_heard_and_believed(believed, episodes, tmp_path):
+    run, (state, reward, _) = believed(**columns_of(episodes)), episodes
+    save_beliefs(run, tmp_path / "new" / "belief.csv")
+    with (tmp_path / "new" / "belief.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == DECISIONS
+    for i in (0, 30, DECISIONS - 1):
+        row, reading = rows[i], run.readings[i]
+        assert float(row["time_s"]) == pytest.approx(0.1 * (i + 1))
+        assert float(row["position_m"]) == pytest.approx(state.x[i], abs=1e-5)
+        assert float(row["reward"]) == pytest.approx(reward[i], abs=1e-5)
+        assert row["inferred_family"] == reading.family
+        assert float(row["inferred_target"]) == pytest.approx(reading.target, abs=1e-5)
+        assert sum(float(row[f"probability_{name}"]) for name in run.families) == pytest.approx(1.0, abs=1e-4)
+        assert float(row[f"latent_{run.latent.shape[1]}"]) == pytest.approx(reading.latent.mean[-1], abs=1e-5)
+        assert [float(row[f"cluster_{k}"]) for k in reading.responsibilities] == pytest.approx(
+            list(reading.responsibilities.values()), abs=1e-5
+        )

@@ -1,0 +1,28 @@
+"""What docs/own-data.md says can be typed as it stands."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from rebody.cli.main import run
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "own-data.md").read_text()
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+COMMANDS = re.findall(r"^    \.venv/bin/rebody (.*)$", PAGE, re.MULTILINE)
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=["live", "environment"])
+def test_python(block, capsys):
+    exec(block, {})
+    assert "goal" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_commands(command, tmp_path, monkeypatch):
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    assert run(shlex.split(command)) == 0
+    assert (tmp_path / "belief" / "belief.png").is_file()

@@ -1,0 +1,59 @@
+"""The picture of a belief, for every kind of module."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from PIL import Image
+
+from rebody.agents.belief import Reading
+from rebody.evaluation.logs import BeliefOverTime, Decisions
+from rebody.report import plot_beliefs
+from rebody.types import Belief
+
+TIME = 25
+
+
+def assert_drawn(path):
+    with Image.open(path) as picture:
+        assert picture.format == "PNG"
+        assert (np.asarray(picture.convert("L")) < 128).mean() > 0.001  # there is something on it
+    assert not plt.get_fignums()
+
+
+def run_of(fields, families, latent=3, clusters=0):
+    time = 0.1 * np.arange(TIME + 1)
+
+    def reading(i):
+        mean = np.sin(0.1 * i * np.arange(1, latent + 1))
+        shares = {k: float(k == 0) for k in range(clusters)}
+        believed = families[i * len(families) // TIME]
+        probabilities = {family: float(family == believed) for family in families}
+        return Reading(believed, 2.0, probabilities, shares, Belief(mean, np.ones(latent)))
+
+    decisions = Decisions(time, {field: np.sin(time) for field in fields}, -np.ones(TIME))
+    return BeliefOverTime("tiny", decisions, [reading(i) for i in range(TIME)])
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        run_of(("x",), ["goal"], latent=1),
+        run_of(("x", "vx"), ["goal", "velocity"], clusters=2),
+        run_of(("x", "vx", "pitch"), ["goal", "velocity", "stand"], clusters=5),
+        run_of(("x",), ["goal", "velocity"]),
+    ],
+    ids=["one family, one number", "two families", "three families", "a velocity that is not seen"],
+)
+def test_drawn_whole(run, tmp_path):
+    path = tmp_path / "new" / "belief.png"
+    plot_beliefs(run, path)
+    assert_drawn(path)
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_family_that_was_never_believed(tmp_path):
+    run = run_of(("x", "vx"), ["goal", "velocity"])
+    for i, reading in enumerate(run.readings):
+        run.readings[i] = Reading("goal", 2.0, reading.probabilities, {}, reading.latent)
+    plot_beliefs(run, tmp_path / "belief.png")
+    assert_drawn(tmp_path / "belief.png")
