@@ -12,12 +12,13 @@ def tracker_preset(spec: RobotSpec) -> TrackerConfig:
     sprawling = TrackerConfig(reach=spec.reach)
     if spec.fall.min_height < 0:
         return sprawling
-    return replace(
+    balancing = replace(
         sprawling,
         # told of a far goal by its distance alone, it learns to stand there; relative errors make it walk, unless
         # staying alive pays more, or values grow large (a longer discount): then it never dares to
         reward=TrackerReward(relative=0.5, arrival=0.2, alive=0.1),
-        iterations=900,
-        widening_iterations=300,
-        sac=replace(sprawling.sac, decay_updates=230_000),
     )
+    if not spec.smoothing_s:
+        return balancing
+    sac = replace(balancing.sac, decay_updates=230_000)
+    return replace(balancing, iterations=900, widening_iterations=300, sac=sac)
