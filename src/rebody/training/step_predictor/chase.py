@@ -79,7 +79,7 @@ def advance(
     """
     chase = world.chase
     follow(TrackerController(tracker), batch, chase.subgoal)
-    world.trail[:-1], world.trail[-1] = world.trail[1:], batch.qpos
+    world.trail[:] = np.concatenate([world.trail[1:], batch.qpos[None]])
     chase.steps_left[:] -= 1
     fell = batch.fallen
     ended = np.equal(chase.steps_left, 0) | fell
