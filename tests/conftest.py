@@ -29,6 +29,7 @@ from rebody.bodies.toys import MassDamper  # noqa: E402
 from rebody.cli.main import run  # noqa: E402
 from rebody.control.flat import FlatPolicy  # noqa: E402
 from rebody.control.sac import Actor, SACConfig  # noqa: E402
+from rebody.control.step_predictor import StepPredictor  # noqa: E402
 from rebody.control.tracker import Tracker  # noqa: E402
 from rebody.evaluation.evaluate import Trial  # noqa: E402
 from rebody.inference.contract import Contract  # noqa: E402
@@ -38,6 +39,7 @@ from rebody.training.flat import report as flat_report  # noqa: E402
 from rebody.training.inference import measure as inference_measure  # noqa: E402
 from rebody.training.inference import report as inference_report  # noqa: E402
 from rebody.training.inference import train as inference_train  # noqa: E402
+from rebody.training.step_predictor import report as step_report  # noqa: E402
 from rebody.training.tracker import report as tracker_report  # noqa: E402
 
 WINDOW, SECONDS = 6, 3.0
@@ -75,8 +77,8 @@ def cheetah():
     return load_robot("cheetah")
 
 
-def lively_actor(observations: int, seed: int) -> Actor:
-    actor = eqx.filter_jit(Actor)(observations, ACTIONS, SACConfig(hidden=(8,)), jax.random.key(seed))
+def lively_actor(observations: int, seed: int, actions: int = ACTIONS) -> Actor:
+    actor = eqx.filter_jit(Actor)(observations, actions, SACConfig(hidden=(8,)), jax.random.key(seed))
     return eqx.tree_at(lambda a: a.net.mlp.weights[-1], actor, replace_fn=lambda w: 10 * w)
 
 
@@ -88,6 +90,26 @@ def tracker():
 @pytest.fixture(scope="session")
 def flat_policy():
     return FlatPolicy(lively_actor(JOINTS + 1 + 4, 2), 10.0)
+
+
+@pytest.fixture(scope="session")
+def step_predictor(tracker):
+    return StepPredictor(lively_actor(JOINTS + 6, 3, actions=1), tracker.reach)
+
+
+@pytest.fixture(scope="session")
+def always(step_predictor):
+    """A function: steps -> a predictor that always says so."""
+
+    def always(steps):
+        action = (steps - 0.5) / 10 - 1
+        return eqx.tree_at(
+            lambda p: (p.actor.net.mlp.weights[-1], p.actor.net.mlp.biases[-1]),
+            step_predictor,
+            (np.zeros((8, 2), np.float32), np.array([np.arctanh(action), 0.0], np.float32)),
+        )
+
+    return always
 
 
 @pytest.fixture(scope="session")
@@ -122,6 +144,10 @@ FLAGS = {
         train flat --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5
         --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
     """,
+    "step-predictor": """
+        train step-predictor --robot cheetah --robots 4 --steps 20 --updates 2 --iterations 9 --replay 60
+        --sac.hidden 8 8 --sac.batch-size 8
+    """,
 }
 FULL = """
     --preset goal-velocity-stand --switch-share 0.5 --mixture.from-iteration 1 --mixture.maximum 6
@@ -142,6 +168,8 @@ def in_short() -> Iterator[pytest.MonkeyPatch]:
         patched.setattr(inference_measure, "DECISIONS", 60)
         patched.setattr(flat_report, "TASKS", 3)
         patched.setattr(flat_report, "DECISIONS", 30)
+        patched.setattr(step_report, "ROBOTS", 8)
+        patched.setattr(step_report, "SECONDS", 2.0)
         yield patched
 
 
@@ -161,6 +189,15 @@ def own_module(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="session")
+def own_tracker(own_module) -> Path:
+    """Folder of a tracker."""
+    folder = own_module.with_name("tracker")
+    with in_short():
+        assert run([*FLAGS["tracker"].split(), "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="session")
 def full_module(tmp_path_factory) -> Path:
     """Folder of an inference module of the full toy."""
     folder = tmp_path_factory.mktemp("trained") / "full"
@@ -170,17 +207,18 @@ def full_module(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def tiny_training(own_module) -> dict[str, list[str]]:
+def tiny_training(own_module, own_tracker) -> dict[str, list[str]]:
     """Command lines of tiny runs without --out, by the kind of artifact that they make."""
     arguments = {kind: flags.split() for kind, flags in FLAGS.items()}
-    return arguments | {"flat": [*arguments["flat"], "--inference", str(own_module)]}
+    parts = {"flat": ["--inference", str(own_module)], "step-predictor": ["--tracker", str(own_tracker)]}
+    return {kind: [*words, *parts.get(kind, [])] for kind, words in arguments.items()}
 
 
 @pytest.fixture(scope="session")
 def trained(own_module, tiny_training) -> dict[str, Path]:
-    """Folders of an inference module, a tracker, and a flat policy that hears that module."""
+    """Folders of a module, a tracker, a flat policy that hears that module, and that tracker's step predictor."""
     folders = {kind: own_module.with_name(kind) for kind in tiny_training}
     with in_short():
-        for kind in ("tracker", "flat"):
+        for kind in ("flat", "step-predictor"):
             assert run([*tiny_training[kind], "--out", str(folders[kind])]) == 0
     return folders

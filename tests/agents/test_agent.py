@@ -10,8 +10,8 @@ import pytest
 
 from rebody.agents.agent import Observation
 from rebody.agents.build import AGENTS, build_agent
+from rebody.agents.clock import begin, decide
 from rebody.agents.parts import Inference, inference_template
-from rebody.agents.rollout import begin, decide
 from rebody.bodies.toys import FullToy
 from rebody.control.high_level import PolicyView
 from rebody.errors import RebodyError

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.agents.parts import inference_template, load_flat, load_inference, load_tracker
+from rebody.agents.parts import inference_template, load_flat, load_inference, load_step_predictor, load_tracker
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import FullToy, MassDamper, PositionToy, describe_toy
 from rebody.errors import RebodyError
@@ -91,6 +91,24 @@ def test_a_loaded_flat_policy_acts_as_the_saved_one(flat_policy, tmp_path):
     save_artifact(tmp_path / "f", kind="flat", config={"robot": "cheetah"}, weights=flat_policy, card="", log="")
     with pytest.raises(RebodyError, match="settings of artifact 'f' are not understood"):
         load_flat(str(tmp_path / "f"))
+
+
+def test_a_loaded_step_predictor_says_what_the_saved_one_does(step_predictor, tracker, tmp_path):
+    config = {
+        "robot": "cheetah", "tracker_hash": "abc", "observations": 23, "hidden": [8], "projections": 0,
+        "reach": {"distance": 5.0, "speed": [-3.0, 3.0], "pitch": None},
+    }  # fmt: skip
+    save_artifact(tmp_path / "s", kind="step-predictor", config=config, weights=step_predictor, card="", log="")
+    loaded = load_step_predictor(str(tmp_path / "s"))
+    assert tree_hash(loaded.predictor) == tree_hash(step_predictor)
+    assert (loaded.name, loaded.robot, loaded.tracker_hash, loaded.predictor.reach) == (
+        "s", "cheetah", "abc", tracker.reach,
+    )  # fmt: skip
+    with pytest.raises(RebodyError, match="'tracker' is needed"):
+        load_tracker(str(tmp_path / "s"))
+    save_artifact(tmp_path / "s", kind="step-predictor", config={}, weights=step_predictor, card="", log="")
+    with pytest.raises(RebodyError, match="settings of artifact 's' are not understood"):
+        load_step_predictor(str(tmp_path / "s"))
 
 
 @pytest.mark.parametrize("kinds", [0, 2])

@@ -11,10 +11,11 @@ import pytest
 from rebody.agents import rollout
 from rebody.agents.agent import IdleAgent, Observation
 from rebody.agents.build import build_agent
+from rebody.agents.clock import EvenClock, begin, decide
 from rebody.agents.controller import FlatController, TrackerController
 from rebody.agents.live import LiveAgent
 from rebody.agents.parts import LoadedTracker
-from rebody.agents.rollout import begin, decide, joint_action, rollout_on_robot, rollout_on_toy
+from rebody.agents.rollout import joint_action, rollout_on_robot, rollout_on_toy
 from rebody.bodies import RobotBatch
 from rebody.bodies.robot import Fall, RobotSpec
 from rebody.errors import RebodyError
@@ -184,7 +185,7 @@ def test_in_thesis_mode_the_module_hears_of_the_world_once_per_stride(tracker, c
     listener = IdleAgent(inferrer=Listener(), reader=lambda belief: None, stride=1, actions=1)
     episodes = rollout_on_robot(
         listener, TrackerController(tracker), cheetah, task, "plain", SEEDS[:1],
-        lambda batch, _: qpos.append(batch.qpos[0].copy()), tick_steps,
+        lambda batch, _: qpos.append(batch.qpos[0].copy()), EvenClock(tick_steps),
     )  # fmt: skip
     x = np.concatenate([[0.0], np.array(qpos)[:, 0]])  # after each control step
     assert len(qpos) == 2 * WINDOW
@@ -204,9 +205,10 @@ def test_in_thesis_mode_the_module_hears_of_the_world_once_per_stride(tracker, c
 
 def test_a_tick_per_decision_is_the_default_bit_for_bit(agent, tracker, cheetah, episodes):
     controller, tasks = TrackerController(tracker), lasting(*TARGETS)
-    ticked = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS, None, cheetah.steps_per_decision)
+    every_decision = EvenClock(cheetah.steps_per_decision)
+    ticked = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS, None, every_decision)
     assert_same(ticked, episodes, rtol=0, atol=0)
-    seldom = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS, None, 5)
+    seldom = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS, None, EvenClock(5))
     assert np.abs(seldom.belief.mean - episodes.belief.mean).max() > 1e-3
 
 

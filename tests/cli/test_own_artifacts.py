@@ -114,6 +114,34 @@ def test_thesis_mode_takes_the_thesis_horizon(trained, evaluate):
         assert (results["thesis"], results["stride"], results["horizon"]) == mode
 
 
+def test_strides_are_predicted_by_an_own_step_predictor(trained, evaluate, tmp_path, capsys):
+    tracker = ["--robot", "cheetah", "--tracker", str(trained["tracker"])]
+    predicted = [*tracker, "--stride", "predicted", "--step-predictor", str(trained["step-predictor"])]
+    code, results = evaluate(*predicted, "--thesis")
+    assert code == 0
+    assert (results["thesis"], results["stride"], results["horizon"]) == (True, "predicted", 1)
+    for episode in results["episodes"]:
+        np.testing.assert_allclose(episode["time_s"], 0.1 * np.arange(1, DECISIONS + 1), atol=1e-6)
+        assert len(np.unique(episode["latent"], axis=0)) > 1
+    parts = ["--inference", str(trained["inference"]), *predicted, "--seconds", SECONDS]
+    assert run(["run", "--task", "goal=2", *parts, "--thesis"]) == 0
+    assert "hidden goal 2" in capsys.readouterr().out
+
+    refused(evaluate(*predicted)[0], capsys, "--stride predicted is of thesis mode: add --thesis")
+    refused(evaluate(*predicted, "--thesis", "--robot", "point-mass")[0], capsys, "a point mass has none")
+    kind = [*tracker, "--thesis", "--stride", "predicted", "--step-predictor", str(trained["tracker"])]
+    refused(evaluate(*kind)[0], capsys, "kind 'tracker'", "'step-predictor' is needed")
+
+
+def test_a_step_predictor_learns_on_a_tracker_of_its_robot(trained, tmp_path, capsys):
+    train = ["train", "step-predictor", "--robot", "cheetah", "--out", str(tmp_path / "new")]
+    refused(run([*train, "--tracker", str(trained["flat"])]), capsys, "kind 'flat'", "'tracker' is needed")
+    refused(run([*train, "--steps", "19"]), capsys, "--steps must be at least 20")
+    other = ["--robot", "hopper", "--tracker", str(trained["tracker"])]
+    refused(run([*train, *other]), capsys, "trained on 'cheetah', not on 'hopper'")
+    assert not (tmp_path / "new").exists()
+
+
 @pytest.mark.parametrize("agent", ["readout", "bayes"])
 def test_what_is_read_is_handed_to_the_tracker(agent, trained, evaluate):
     _, results = evaluate("--robot", "cheetah", "--tracker", str(trained["tracker"]), "--agent", agent)

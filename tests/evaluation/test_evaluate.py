@@ -8,8 +8,8 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-from rebody.agents.build import AGENTS
-from rebody.agents.parts import inference_template
+from rebody.agents.build import AGENTS, check_step_predictor
+from rebody.agents.parts import LoadedStepPredictor, inference_template
 from rebody.bodies import load_robot
 from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
@@ -218,6 +218,46 @@ def test_in_thesis_mode_a_belief_lasts_a_stride(trial, results):
         np.testing.assert_array_equal(changes, np.arange(4, 30, 5))
         assert len(episode.time_s) == 30
         assert episode.oracle_return == pytest.approx(ours.oracle_return, rel=1e-6)  # the oracle is no thesis
+
+
+@pytest.fixture(scope="module")
+def predicting(trial, always):
+    """A function: steps -> thesis mode with a predictor that always says so."""
+
+    def predicting(steps):
+        part = LoadedStepPredictor("tiny-predictor", "cheetah", tree_hash(trial.tracker.tracker), always(steps))
+        return replace(trial, thesis=True, step_predictor=part)
+
+    return predicting
+
+
+def test_a_prediction_that_is_always_the_same_is_a_fixed_stride(trial, predicting):
+    predicted = evaluate(predicting(4), SPECS, SEEDS)
+    fixed = evaluate(replace(trial, thesis=True, stride=4), SPECS, SEEDS)
+    assert predicted.episodes == fixed.episodes
+    assert (predicted.stride, fixed.stride) == ("predicted", 4)
+    assert predicted.to_json()["stride"] == "predicted"
+
+
+def test_nothing_that_is_frozen_changes(predicting):
+    trial = predicting(3)
+    frozen = (trial.inference.parts, trial.tracker.tracker, trial.step_predictor.predictor)
+    before = tree_hash(frozen)
+    evaluate(trial, SPECS, 1)
+    assert tree_hash(frozen) == before
+
+
+def test_a_step_predictor_that_does_not_fit_is_refused(trial, predicting):
+    told = predicting(3)
+    for change, said in (
+        ({"robot": "walker"}, "'tiny-predictor' was trained on 'walker', not on 'cheetah'"),
+        ({"tracker_hash": "0" * 64}, "knows how fast another tracker than 'tiny-tracker' is"),
+    ):
+        with pytest.raises(RebodyError, match=said):
+            evaluate(replace(told, step_predictor=replace(told.step_predictor, **change)), SPECS, 1)
+    stands = replace(trial.inference, contract=replace(trial.inference.contract, target_ranges={"stand": (-1.0, 1.0)}))
+    with pytest.raises(RebodyError, match="knows goals and speeds, and 'tiny' may ask for stand"):
+        check_step_predictor(told.step_predictor, told.tracker, stands)
 
 
 def of_another_module(trial):

@@ -14,9 +14,10 @@ from rebody.store import load_artifact, tree_hash
 from rebody.training.flat import train as flat_train
 from rebody.training.inference import train as inference_train
 from rebody.training.run import Run
+from rebody.training.step_predictor import train as step_train
 from rebody.training.tracker import train as tracker_train
 
-KINDS = ("tracker", "inference", "flat")
+KINDS = ("tracker", "inference", "flat", "step-predictor")
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,8 @@ def checkpoint(out: Path) -> dict:
 @pytest.fixture(scope="session")
 def pipelines(tiny_training) -> dict[str, Pipeline]:
     """All of them, by name."""
-    modules = {"tracker": tracker_train, "inference": inference_train, "flat": flat_train}
-    return {kind: Pipeline(kind, tiny_training[kind], modules[kind]) for kind in KINDS}
+    modules = (tracker_train, inference_train, flat_train, step_train)
+    return {kind: Pipeline(kind, tiny_training[kind], module) for kind, module in zip(KINDS, modules, strict=True)}
 
 
 @pytest.fixture(params=KINDS)

@@ -5,12 +5,14 @@ from typing import Literal
 import jax.numpy as jnp
 
 from rebody.agents.agent import Agent, FlatAgent, IdleAgent, OracleAgent, ReadoutAgent, ReuseAgent
-from rebody.agents.parts import Inference, LoadedFlat, LoadedSlots, LoadedTracker
+from rebody.agents.parts import Inference, LoadedFlat, LoadedSlots, LoadedStepPredictor, LoadedTracker
 from rebody.agents.slots import OneSlot, SlotChooser, SlotOfCluster
 from rebody.bodies import RobotSpec
+from rebody.control.step_predictor import SLOTS
 from rebody.errors import RebodyError
 from rebody.inference.exact import exact_posterior, read_mode
 from rebody.store import tree_hash
+from rebody.tasks import FAMILIES
 from rebody.types import Task
 
 HORIZON = 15
@@ -34,7 +36,7 @@ def check_agent(kind: str) -> None:
         raise RebodyError(f"unknown agent '{kind}'. Agents are: {', '.join(AGENTS)}.")
 
 
-def check_robot_of(part: LoadedTracker | LoadedFlat, spec: RobotSpec) -> None:
+def check_robot_of(part: LoadedTracker | LoadedFlat | LoadedStepPredictor, spec: RobotSpec) -> None:
     """RebodyError if a policy was trained on another robot, or on another description of it."""
     if part.robot != spec.name:
         raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{spec.name}'.")
@@ -51,6 +53,21 @@ def check_module_of(what: str, part: LoadedFlat | LoadedSlots, inference: Infere
         raise RebodyError(
             f"{what} '{part.name}' was trained on the beliefs of another module than '{inference.name}'. "
             "Use that one (its card names it), or train it anew."
+        )
+
+
+def check_step_predictor(part: LoadedStepPredictor, tracker: LoadedTracker, inference: Inference) -> None:
+    """RebodyError if a step predictor knows another tracker, or not all that the module's subgoals may be about."""
+    if part.tracker_hash != tree_hash(tracker.tracker):
+        raise RebodyError(
+            f"step predictor '{part.name}' knows how fast another tracker than '{tracker.name}' is. "
+            "Use that one (its card names it), or train it anew (rebody train step-predictor)."
+        )
+    unknown = [FAMILIES[family].name for family in inference.contract.families if family not in SLOTS]
+    if unknown:
+        raise RebodyError(
+            f"step predictor '{part.name}' knows goals and speeds, and '{inference.name}' may ask for "
+            f"{', '.join(unknown)}. Use a fixed --stride."
         )
 
 

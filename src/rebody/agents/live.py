@@ -7,9 +7,10 @@ from jaxtyping import Float
 
 from rebody.agents.agent import Observation
 from rebody.agents.build import HORIZON, build_agent, check_robot_of, slot_chooser
+from rebody.agents.clock import begin, decide
 from rebody.agents.controller import TrackerController
 from rebody.agents.parts import Inference, LoadedSlots, LoadedTracker, load_inference, load_slots_of, load_tracker
-from rebody.agents.rollout import begin, decide, joint_action
+from rebody.agents.rollout import joint_action
 from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
 from rebody.tasks import FAMILIES

@@ -18,6 +18,7 @@ from rebody.bodies.toys import Toy, make_toy
 from rebody.control.flat import FlatPolicy
 from rebody.control.high_level import HighLevelPolicy, PolicyView, TaskCode
 from rebody.control.sac import Actor, SACConfig
+from rebody.control.step_predictor import StepPredictor
 from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig, InferenceModule
@@ -84,6 +85,17 @@ class LoadedFlat:
     policy: FlatPolicy
 
 
+@dataclass(frozen=True)
+class LoadedStepPredictor:
+    """A loaded step predictor; it knows how fast one tracker is."""
+
+    name: str
+    robot: str
+    tracker_hash: str
+    """Of the tracker's weights."""
+    predictor: StepPredictor
+
+
 class SlotParts(eqx.Module):
     """What a classifier artifact holds: two ways to choose a slot."""
 
@@ -129,6 +141,11 @@ def flat_template(config: dict[str, Any]) -> FlatPolicy:
     return FlatPolicy(_actor_template(config["observations"], config["actions"], config), config["reach"])
 
 
+def step_predictor_template(config: dict[str, Any]) -> StepPredictor:
+    """A step predictor of the right shapes, to be filled with weights."""
+    return StepPredictor(_actor_template(config["observations"], 1, config), Reach(**with_tuples(config["reach"])))
+
+
 def slots_template(config: dict[str, Any]) -> SlotParts:
     """A classifier of the right shapes, to be filled with weights."""
     families = tuple(config["families"])
@@ -158,6 +175,14 @@ def load_flat(reference: str) -> LoadedFlat:
     with _understood(artifact):
         config = artifact.config
         return LoadedFlat(artifact.name, config["robot"], config["inference_hash"], _fill(flat_template, artifact))
+
+
+def load_step_predictor(reference: str) -> LoadedStepPredictor:
+    """A shipped step predictor by name, or one in a folder; RebodyError if it cannot be read."""
+    artifact = load_artifact(reference, "step-predictor")
+    with _understood(artifact):
+        config, predictor = artifact.config, _fill(step_predictor_template, artifact)
+        return LoadedStepPredictor(artifact.name, config["robot"], config["tracker_hash"], predictor)
 
 
 def load_slots(reference: str) -> LoadedSlots:

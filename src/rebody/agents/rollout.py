@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from rebody.agents.agent import Agent, Carry, Command, Observation
+from rebody.agents.agent import Agent, Observation
+from rebody.agents.clock import Clock, EvenClock, place
 from rebody.agents.controller import Controller
 from rebody.bodies.robot import RobotBatch, RobotSpec
 from rebody.bodies.toys import Disturbance, Toy
@@ -60,13 +61,13 @@ def rollout_on_robot(
     form: RewardForm,
     seeds: Int[np.ndarray, " episode"],
     on_frame: OnFrame | None = None,
-    tick_steps: int | None = None,
+    clock: Clock | None = None,
 ) -> Episodes:
     """Episodes on robots from x = 0 at rest with reset noise; `tasks` are the active ones, [time, episode].
 
     Nothing ends early: a fallen robot lies there and keeps scoring. `on_frame` is called at every control step.
-    The agent decides every `tick_steps` control steps (thesis mode, 6.3.3); default is every 0.1 s. What is
-    returned stays 0.1 s apart.
+    The clock says when the agent decides (thesis mode, 6.3.3); default is every 0.1 s. What is returned stays 0.1 s
+    apart.
     """
     decisions, size = tasks.target.shape
     per_decision = spec.steps_per_decision
@@ -74,7 +75,9 @@ def rollout_on_robot(
     for episode, seed in enumerate(seeds):
         batch.reset(np.random.default_rng(seed), np.arange(size) == episode)
     trail = deque([batch.qpos.copy()], maxlen=per_decision + 1)  # over the last 0.1 s
-    carry, command = begin(agent, spec.observe(batch.qpos, trail[0]))
+    clock = clock or EvenClock(per_decision)
+    carry, command = clock.begin(agent, spec.observe(batch.qpos, trail[0]))
+    steps_left = clock.steps(batch, command.subgoal)
     fell, records = np.zeros(size, bool), []
     for step in range(1, decisions * per_decision + 1):
         held = command.subgoal
@@ -83,14 +86,16 @@ def rollout_on_robot(
         if on_frame is not None:
             on_frame(batch, held)
         trail.append(batch.qpos.copy())
-        is_tick, is_recorded = step % (tick_steps or per_decision) == 0, step % per_decision == 0
-        if not (is_tick or is_recorded):
+        steps_left = steps_left - 1
+        due, is_recorded = steps_left == 0, step % per_decision == 0
+        if not (due.any() or is_recorded):
             continue
         state = spec.observe(batch.qpos, trail[0])
         i = (step - 1) // per_decision
         earned = task_reward(Task(tasks.family[i], tasks.target[i]), state, form)
-        if is_tick:
-            carry, command = decide(agent, carry, Observation(state, earned))
+        if due.any():
+            carry, command = clock.decide(agent, carry, Observation(state, earned), due)
+            steps_left = np.where(due, clock.steps(batch, command.subgoal), steps_left)
         if is_recorded:
             records.append((state, earned, carry.belief, held))
     state, earned, belief, subgoal = jax.tree.map(lambda *steps: np.stack(steps), *records)
@@ -99,9 +104,7 @@ def rollout_on_robot(
 
 def follow(controller: Controller, batch: RobotBatch, subgoal: Subgoal, belief: Belief | None = None) -> None:
     """One control step of every robot."""
-    joints = batch.joint_state()
-    x, pitch = (where.astype(np.float32) for where in (batch.x, batch.spec.pitch(batch.qpos)))
-    batch.step(np.asarray(joint_action(controller, joints, x, pitch, subgoal, belief)))
+    batch.step(np.asarray(joint_action(controller, batch.joint_state(), *place(batch), subgoal, belief)))
 
 
 @eqx.filter_jit
@@ -115,18 +118,6 @@ def joint_action(
 ) -> Float[AnyArray, "*episode action"]:
     """What the controller does with the joints of robots at x [m] and pitch [rad]."""
     return controller(joints, x, pitch, subgoal, belief)
-
-
-@eqx.filter_jit
-def begin(agent: Agent, state: GlobalState) -> tuple[Carry, Command]:
-    """`Agent.begin`, compiled."""
-    return agent.begin(state)
-
-
-@eqx.filter_jit
-def decide(agent: Agent, carry: Carry, observation: Observation) -> tuple[Carry, Command]:
-    """`Agent.decide`, compiled."""
-    return agent.decide(carry, observation)
 
 
 @eqx.filter_jit

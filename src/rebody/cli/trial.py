@@ -2,13 +2,20 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
 from rebody.agents.build import AGENTS, HORIZON, SlotsBy, check_agent
-from rebody.agents.parts import load_flat, load_inference, load_slots_of, load_tracker
-from rebody.bodies import load_robot
+from rebody.agents.parts import (
+    LoadedStepPredictor,
+    load_flat,
+    load_inference,
+    load_slots_of,
+    load_step_predictor,
+    load_tracker,
+)
+from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import POINT_MASS, Trial
 
@@ -34,8 +41,11 @@ class TrialOptions:
     """Choose them by the classifier, or by the mixture's clusters."""
     seconds: float = 20.0
     """Length of an episode."""
-    stride: int = 1
-    """Decisions for which a subgoal is held; in thesis mode control steps from one decision to the next."""
+    stride: int | Literal["predicted"] = 1
+    """Decisions for which a subgoal is held; in thesis mode control steps from one decision to the next, a number or
+    chosen anew each time by the step predictor (6.4.3)."""
+    step_predictor: str | None = None
+    """Step predictor of `--stride predicted`; default step-predictor-ROBOT."""
     horizon: int | None = None
     """Decisions that `reuse` looks ahead; default 15, in thesis mode 1."""
     thesis: bool = False
@@ -44,8 +54,9 @@ class TrialOptions:
     def load(self) -> Trial:
         """Load the parts; RebodyError where an option makes no sense or a part cannot be had."""
         check_agent(self.agent)
-        if self.stride < 1 or (self.horizon is not None and self.horizon < 1):
-            raise RebodyError(f"--{'stride' if self.stride < 1 else 'horizon'} must be at least 1.")
+        stride = self._fixed_stride()
+        if stride < 1 or (self.horizon is not None and self.horizon < 1):
+            raise RebodyError(f"--{'stride' if stride < 1 else 'horizon'} must be at least 1.")
         if not math.isfinite(self.seconds):
             raise RebodyError(f"--seconds must be finite, not {self.seconds:g}.")
         robot = None if self.robot == POINT_MASS else load_robot(self.robot)
@@ -60,7 +71,23 @@ class TrialOptions:
             slots=load_slots_of(inference, self.classifier) if bridged else None,
             slots_by=self.slots_by,
             seconds=self.seconds,
-            stride=self.stride,
+            stride=stride,
             horizon=self.horizon or (1 if self.thesis else HORIZON),
             thesis=self.thesis,
+            step_predictor=self._step_predictor(robot),
         )
+
+    def _fixed_stride(self) -> int:
+        """The number, 1 where there is none; RebodyError where nothing can be predicted."""
+        if self.stride != "predicted":
+            return self.stride
+        if not self.thesis:
+            raise RebodyError("--stride predicted is of thesis mode: add --thesis, or give a number of decisions.")
+        if self.robot == POINT_MASS:
+            raise RebodyError("--stride predicted counts control steps of a robot; a point mass has none.")
+        return 1
+
+    def _step_predictor(self, robot: RobotSpec | None) -> LoadedStepPredictor | None:
+        if robot is None or self.stride != "predicted":
+            return None
+        return load_step_predictor(self.step_predictor or f"step-predictor-{robot.name}")

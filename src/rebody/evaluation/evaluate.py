@@ -14,10 +14,12 @@ from rebody.agents.build import (
     check_agent,
     check_module_of,
     check_robot_of,
+    check_step_predictor,
     slot_chooser,
 )
+from rebody.agents.clock import Clock, EvenClock, PredictedClock
 from rebody.agents.controller import Controller, FlatController, TrackerController
-from rebody.agents.parts import Inference, LoadedFlat, LoadedSlots, LoadedTracker
+from rebody.agents.parts import Inference, LoadedFlat, LoadedSlots, LoadedStepPredictor, LoadedTracker
 from rebody.agents.rollout import Episodes, OnFrame, rollout_on_robot, rollout_on_toy
 from rebody.bodies import RobotSpec
 from rebody.bodies.toys import Toy
@@ -54,6 +56,8 @@ class Trial:
     horizon: int = HORIZON
     thesis: bool = False
     """The encoder ticks once per stride (6.3.3)."""
+    step_predictor: LoadedStepPredictor | None = None
+    """In thesis mode it chooses each stride anew, in place of `stride` (6.4.3)."""
     on_frame: OnFrame | None = None
     """Called at every control step of a robot, to film it."""
 
@@ -90,7 +94,7 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
         inference=trial.inference.name,
         tracker=trial.tracker.name if trial.tracker else None,
         control_dt=trial.robot.control_dt if trial.robot else DECISION_DT,
-        stride=trial.stride,
+        stride="predicted" if trial.step_predictor else trial.stride,
         horizon=trial.horizon,
         thesis=trial.thesis,
         frozen=frozen,
@@ -118,10 +122,8 @@ def run_trial(trial: Trial, agent: Agent, tasks: Task, seeds: np.ndarray) -> Epi
     if trial.robot is None:
         episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, form)
     else:
-        tick_steps = trial.stride if trial.thesis else None
-        episodes = rollout_on_robot(
-            agent, _controller(trial), trial.robot, tasks, form, seeds, trial.on_frame, tick_steps
-        )
+        clock, controller = _clock(trial), _controller(trial)
+        episodes = rollout_on_robot(agent, controller, trial.robot, tasks, form, seeds, trial.on_frame, clock)
     return jax.tree.map(np.asarray, episodes)
 
 
@@ -139,6 +141,13 @@ def _clusters(trial: Trial, episodes: Episodes) -> Int[np.ndarray, "time episode
     if mixture is None or trial.agent == "bayes":
         return np.zeros(latent.shape[:2], int)
     return np.asarray(mixture.component(latent))
+
+
+def _clock(trial: Trial) -> Clock | None:
+    """When the agent decides; None for our mode."""
+    if not trial.thesis:
+        return None
+    return PredictedClock(trial.step_predictor.predictor) if trial.step_predictor else EvenClock(trial.stride)
 
 
 def _controller(trial: Trial) -> Controller:
@@ -165,11 +174,14 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
         return
     slots = trial.tracker.tracker.slots if trial.tracker else slots_of(trial.robot.reach)
     trial.inference.contract.check_body(trial.robot.name, trial.robot.moving_fields, slots)
-    for part in (trial.tracker, trial.flat):
+    for part in (trial.tracker, trial.flat, trial.step_predictor):
         if part is not None:
             check_robot_of(part, trial.robot)
     if trial.flat is not None:
         check_module_of("flat policy", trial.flat, trial.inference)
+    if trial.step_predictor is not None:
+        assert trial.tracker is not None
+        check_step_predictor(trial.step_predictor, trial.tracker, trial.inference)
 
 
 def _check_tasks(trial: Trial, specs: list[TaskSpec]) -> None:

@@ -75,7 +75,7 @@ class Results:
     inference: str
     tracker: str | None
     control_dt: float
-    stride: int
+    stride: int | str
     horizon: int
     thesis: bool
     frozen: dict[str, str]
