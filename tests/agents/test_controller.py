@@ -32,6 +32,12 @@ def test_the_tracker_is_told_the_distance(tracker, following):
     np.testing.assert_allclose(joint_action(following, JOINTS, X, LEVEL, SUBGOAL, None), expected, atol=1e-6)
 
 
+def test_a_far_goal_is_shown_nearer_and_a_speed_as_it_is(tracker):
+    expected = tracker(JOINTS, Command(SUBGOAL.slot, np.array([0.5, 2.0], np.float32)))
+    cautious = TrackerController(tracker, goal_ahead=0.5)
+    np.testing.assert_allclose(joint_action(cautious, JOINTS, X, LEVEL, SUBGOAL, None), expected, atol=1e-6)
+
+
 def test_a_tracker_does_not_look_at_the_belief(following):
     action = joint_action(following, JOINTS, X, LEVEL, SUBGOAL, None)
     np.testing.assert_array_equal(joint_action(following, JOINTS, X, LEVEL, SUBGOAL, BELIEF), action)

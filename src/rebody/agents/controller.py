@@ -1,12 +1,15 @@
 """What moves a robot's joints at every control step."""
 
+import math
 from abc import abstractmethod
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Float
 
 from rebody.control.flat import FlatPolicy
-from rebody.control.tracker import Tracker, relative
+from rebody.control.tracker import Command, Tracker, relative
+from rebody.tasks import GOAL
 from rebody.types import AnyArray, Belief, Subgoal
 
 
@@ -29,10 +32,14 @@ class TrackerController(Controller):
     """Follows the subgoal."""
 
     tracker: Tracker
+    goal_ahead: float = eqx.field(static=True, default=math.inf)
+    """Farthest that a goal is shown ahead [m], see `RobotSpec.goal_ahead`."""
 
     def __call__(self, joints, x, pitch, subgoal, belief):
         """A goal is made relative to where the robot is now."""
-        return self.tracker(joints, relative(subgoal, x, pitch))
+        command = relative(subgoal, x, pitch)
+        near = jnp.clip(command.value, -self.goal_ahead, self.goal_ahead)
+        return self.tracker(joints, Command(command.slot, jnp.where(command.slot == GOAL, near, command.value)))
 
 
 class FlatController(Controller):

@@ -32,7 +32,7 @@ class LiveAgent:
         check_robot_of(tracker, spec)
         inference.contract.check_body(spec.name, spec.moving_fields, tracker.tracker.slots)
         self._spec, self._inference = spec, inference
-        self._controller = TrackerController(tracker.tracker)
+        self._controller = TrackerController(tracker.tracker, spec.goal_ahead)
         self._agent = build_agent(
             "reuse", inference, slots=slot_chooser(inference, slots, "classifier"), horizon=horizon
         )

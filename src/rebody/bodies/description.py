@@ -1,6 +1,7 @@
 """Robots from TOML files: one format for the shipped ones and for a user's own."""
 
 import difflib
+import math
 import tomllib
 from pathlib import Path
 
@@ -44,6 +45,7 @@ class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     reach: _Reach
     reset_noise: float = 0.01
     smoothing_s: float = 0.0
+    goal_ahead: float = math.inf
 
 
 def shipped_robots() -> tuple[str, ...]:
@@ -81,6 +83,7 @@ def _read(path: Path) -> RobotSpec:
         root=_root(description.root, path),
         reset_noise=description.reset_noise,
         smoothing_s=description.smoothing_s,
+        goal_ahead=description.goal_ahead,
         fall=Fall(**msgspec.structs.asdict(description.fall)),
         reach=Reach(**msgspec.structs.asdict(description.reach)),
     )
@@ -113,6 +116,8 @@ def _check_values(spec: RobotSpec, path: Path) -> None:
         problems.append("reset_noise must not be negative")
     if not spec.smoothing_s >= 0:
         problems.append("smoothing_s must not be negative")
+    if not spec.goal_ahead > 0:
+        problems.append("goal_ahead must be positive")
     if not spec.fall.max_pitch > 0 or not spec.fall.lasts_s >= 0:
         problems.append("[fall] max_pitch must be positive, lasts_s not negative")
     low, high = spec.reach.speed

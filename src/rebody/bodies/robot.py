@@ -76,6 +76,9 @@ class RobotSpec:
     """When it counts as fallen."""
     reach: Reach
     """What its tracker is trained for."""
+    goal_ahead: float = math.inf
+    """Farthest that its tracker is shown a goal ahead [m]: one that pulls from far away for long can make a robot that
+    walks run until it falls."""
     smoothing_s: float = 0.0
     """Time constant of the pace, the mean speed that a tracker sees and is paid by [s]; 0 for the speed of a step. A
     robot that hops or walks moves unevenly: paid by every step, it does best by going slower than it is told."""

@@ -155,7 +155,8 @@ def _controller(trial: Trial) -> Controller:
         assert trial.flat is not None
         return FlatController(trial.flat.policy)
     assert trial.tracker is not None
-    return TrackerController(trial.tracker.tracker)
+    assert trial.robot is not None
+    return TrackerController(trial.tracker.tracker, trial.robot.goal_ahead)
 
 
 def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:

@@ -53,13 +53,14 @@ def stress(tracker: Tracker, spec: RobotSpec, episodes: int, seed: int = 0) -> S
     batch.reset(rng)
     subgoal, fell = _subgoals(tracker, batch, rng), np.zeros(episodes, bool)
     changes, pushes = (Clock(rng, range_s, spec.control_dt, episodes) for range_s in (CHANGE_S, PUSH_S))
+    controller = TrackerController(tracker, spec.goal_ahead)
     for _ in range(round(SECONDS / spec.control_dt)):
         is_new, fresh = changes.due(), _subgoals(tracker, batch, rng)
         subgoal = Subgoal(
             np.where(is_new, fresh.slot, subgoal.slot), np.where(is_new, fresh.value, subgoal.value).astype(np.float32)
         )
         batch.push(np.where(pushes.due(), rng.choice([-PUSH, PUSH], episodes), 0.0))
-        follow(TrackerController(tracker), batch, subgoal)
+        follow(controller, batch, subgoal)
         fell |= batch.fallen
     return StressResult(fell, batch.fallen.copy())
 
