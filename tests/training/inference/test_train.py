@@ -95,7 +95,7 @@ def test_many_windows_begin_with_their_episode(labelled, config):
 @pytest.mark.parametrize("stored", [1, 3])
 def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, config, stored):
     plain = replace(config, arrival=0.0, policy_scales=(1.0, 1.0))
-    batch = sample_transitions(labelled, stored, plain, (), jax.random.key(0))
+    batch = sample_transitions(labelled, stored, plain, plain.policy_view, jax.random.key(0))
     x, vx, *belief = np.asarray(batch.observation).T
     group, episode, time = unpack(x)
     assert set(group) == set(range(stored))
@@ -126,7 +126,7 @@ def test_the_oracle_is_told_the_task_that_is_on_at_every_decision(labelled, conf
         assert tree_hash(getattr(told, name)) == tree_hash(getattr(labelled, name))
 
     plain = replace(config, policy_scales=(1.0, 1.0))
-    batch = sample_transitions(told, 3, plain, (), jax.random.key(0))
+    batch = sample_transitions(told, 3, plain, plain.policy_view, jax.random.key(0))
     group, episode, time = unpack(batch.observation[:, 0])
     for observation, now in (
         (batch.observation, time),
@@ -208,17 +208,17 @@ def test_what_is_kept_are_the_averaged_policies(state, config):
 
 def test_scales_divide_what_the_policy_sees(labelled, config):
     plain, scaled = (
-        sample_transitions(labelled, 3, replace(config, policy_scales=scales), (), jax.random.key(0)).observation
+        sample_transitions(labelled, 3, config, replace(config.policy_view, scales=scales), jax.random.key(0))
         for scales in ((1.0, 1.0), (10.0, 3.5))
     )
-    np.testing.assert_allclose(scaled[:, :2] * np.array([10.0, 3.5]), plain[:, :2], rtol=1e-5)
+    np.testing.assert_allclose(scaled.observation[:, :2] * np.array([10.0, 3.5]), plain.observation[:, :2], rtol=1e-5)
 
 
 def test_arrival_is_paid_on_the_spot_and_half_of_it_at_ten_centimetres(labelled, config):
     paid = replace(config, arrival=0.4)
     for earned, extra in ((0.0, 0.4), (-0.1, 0.2), (-10.0, 0.4 * 0.1 / 10.1)):
         replay = eqx.tree_at(lambda e: e.reward, labelled, jnp.full_like(labelled.reward, earned))
-        batch = sample_transitions(replay, 3, paid, (), jax.random.key(0))
+        batch = sample_transitions(replay, 3, paid, paid.policy_view, jax.random.key(0))
         np.testing.assert_allclose(batch.reward, earned / 10.0 + extra, rtol=1e-5)
 
 
