@@ -21,8 +21,8 @@ from rebody.tasks.task_file import Switch, TaskSpec
 HIDDEN_GOALS = np.linspace(2.0, 12.0, 5)
 SPEEDS, SLOWEST = 5, 1.0
 """Speeds either way, from the slowest that the module learned on [m/s] to the fastest that the tracker did."""
-SHOWN_S = 16.0
-"""Length of the filmed episode [s]; its task changes half-way."""
+SHOWN_S, CHANGE_S = 16.0, 5.0
+"""Length of the filmed episode [s], and when its task changes: early enough that every robot can come back."""
 
 
 @dataclass(frozen=True)
@@ -86,10 +86,10 @@ def hidden_tasks(trial: Trial) -> list[TaskSpec]:
 
 
 def shown_task(trial: Trial) -> TaskSpec:
-    """Run forward, and half-way go back to where it began."""
+    """Run forward, then go back to where it began."""
     assert trial.robot is not None
     speed = round(0.6 * trial.robot.reach.speed[1], 2)
-    return TaskSpec("velocity", speed, Switch(at_s=SHOWN_S / 2, family="goal", target=2.0))
+    return TaskSpec("velocity", speed, Switch(at_s=CHANGE_S, family="goal", target=2.0))
 
 
 def _table(reuse: Results, oracle: Results, idle: Results) -> Table:
