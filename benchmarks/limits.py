@@ -10,17 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from rebody.agents.parts import load_inference, load_slots_of, load_tracker
+from rebody.agents.parts import load_inference
 from rebody.bodies import RobotSpec, load_robot
+from rebody.cli.trial import TrialOptions
 from rebody.evaluation import evaluate
-from rebody.evaluation.evaluate import Trial
 from rebody.report.style import figure
 from rebody.tasks.task_file import TaskSpec
 
 GOALS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0, 15.0, 18.0, 22.0, 26.0)
 SPEEDS = (0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 SEEDS = 3
-SECONDS = 20.0
 
 
 def main() -> None:
@@ -36,14 +35,9 @@ def main() -> None:
 
 def errors_of(robot: str, name: str) -> dict[str, dict[float, float]]:
     """Per family the median final error at each target [m, m/s]."""
-    module, spec = load_inference(name), load_robot(robot)
-    trial = Trial(
-        "reuse", module, spec, load_tracker(f"tracker-{robot}"), slots=load_slots_of(module, None), seconds=SECONDS
-    )
-    specs = tasks_within(spec)
-    episodes = evaluate(trial, specs, SEEDS).episodes
+    specs = tasks_within(load_robot(robot))
     errors: dict[str, dict[float, list[float]]] = {"goal": {}, "velocity": {}}
-    for episode in episodes:
+    for episode in evaluate(TrialOptions(robot=robot, inference=name).load(), specs, SEEDS).episodes:
         errors[episode.family].setdefault(episode.target, []).append(episode.final_error)
     return {
         family: {target: float(np.median(of)) for target, of in sorted(by_target.items())}

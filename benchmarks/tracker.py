@@ -22,6 +22,7 @@ import jax
 import numpy as np
 
 import rebody  # noqa: F401 (registers the environment)
+from rebody.agents.clock import place
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control.tracker import relative, tracker_observation
 from rebody.report.style import figure
@@ -72,8 +73,7 @@ def errors(predict: Predict) -> dict[str, float]:
     subgoal = Subgoal(slot, np.concatenate(value).astype(np.float32))
 
     def control_step(batch: RobotBatch) -> None:
-        x, pitch = (where.astype(np.float32) for where in (batch.x, SPEC.pitch(batch.qpos)))
-        batch.step(predict(np.asarray(_observe(batch.joint_state(), subgoal, x, pitch))))
+        batch.step(predict(np.asarray(_observe(batch.joint_state(), subgoal, *place(batch)))))
 
     states, _ = run_robots(SPEC, len(slot), control_step)
     found = final_error(Task(slot, subgoal.value), states)

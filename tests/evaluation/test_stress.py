@@ -11,7 +11,7 @@ from rebody.cli.main import run
 from rebody.control.sac import Actor, SACConfig
 from rebody.control.tracker import Command, Tracker, tracker_observation
 from rebody.evaluation import stress as module
-from rebody.evaluation.stress import Clock, stress
+from rebody.evaluation.stress import Countdown, stress
 from rebody.tasks import GOAL, STAND, VELOCITY
 
 
@@ -50,7 +50,7 @@ def test_pushes_and_subgoals_hang_on_the_seed_alone(monkeypatch):
 
 
 def test_a_clock_strikes_within_its_range():
-    clock = Clock(np.random.default_rng(0), (0.5, 1.0), 0.05, 200)
+    clock = Countdown(np.random.default_rng(0), (0.5, 1.0), 0.05, 200)
     struck = np.array([clock.due() for _ in range(400)])
     between = np.concatenate([np.diff(np.flatnonzero(of_robot)) for of_robot in struck.T])
     assert (between.min(), between.max()) == (10, 20)

@@ -4,17 +4,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from rebody.evaluation.statistics import with_interval
-from rebody.tasks.figures import tolerance
+from rebody.tasks.figures import mean_velocity, tolerance
 from rebody.types import DECISION_DT
 
 if TYPE_CHECKING:
     from rebody.evaluation.results import EpisodeResult
-
-MEAN_S = 1.0
-"""Speeds are judged by their mean over this time, as in the final error."""
 
 
 def summarise_changes(episodes: Sequence["EpisodeResult"]) -> dict[str, Any] | None:
@@ -56,12 +53,5 @@ def _within_tolerance(episode: "EpisodeResult") -> Bool[np.ndarray, " time"]:
     family = episode.active_family[-1]
     reached = np.array(episode.reached)
     if family == "velocity":
-        reached = _mean_speed(np.array(episode.position_m))
+        reached = mean_velocity(np.array(episode.position_m))
     return np.abs(reached - episode.active_target[-1]) <= tolerance(family)
-
-
-def _mean_speed(position: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
-    """Over the last second [m/s]; as far back as there is something in the first."""
-    steps = round(MEAN_S / DECISION_DT)
-    before = np.concatenate([np.full(steps, position[0]), position[:-steps]])
-    return (position - before) / MEAN_S

@@ -29,7 +29,7 @@ class StressResult:
     ended_lying: Bool[np.ndarray, " episode"]
 
 
-class Clock:
+class Countdown:
     """Counts down to the next event of each robot."""
 
     def __init__(self, rng: np.random.Generator, range_s: tuple[float, float], control_dt: float, size: int):
@@ -52,7 +52,7 @@ def stress(tracker: Tracker, spec: RobotSpec, episodes: int, seed: int = 0) -> S
     rng, batch = np.random.default_rng(seed), RobotBatch(spec, episodes)
     batch.reset(rng)
     subgoal, fell = _subgoals(tracker, batch, rng), np.zeros(episodes, bool)
-    changes, pushes = (Clock(rng, range_s, spec.control_dt, episodes) for range_s in (CHANGE_S, PUSH_S))
+    changes, pushes = (Countdown(rng, range_s, spec.control_dt, episodes) for range_s in (CHANGE_S, PUSH_S))
     controller = TrackerController(tracker, spec.goal_ahead)
     for _ in range(round(SECONDS / spec.control_dt)):
         is_new, fresh = changes.due(), _subgoals(tracker, batch, rng)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from rebody.evaluation.logs import COLUMNS, BeliefOverTime
 from rebody.report.figures import FAMILY_COLOURS
 from rebody.report.style import TRUTH, figure
-from rebody.tasks import FAMILIES, Family
+from rebody.tasks import FAMILIES, Family, family_index
 
 OUTLIERS = 5
 """Percentage of believed targets, at either end, that do not stretch an axis: first guesses may lie anywhere."""
@@ -94,4 +94,4 @@ def _clusters(axes: Axes, run: BeliefOverTime) -> None:
 
 
 def _colour(family: str) -> str:
-    return dict(zip((known.name for known in FAMILIES), FAMILY_COLOURS, strict=True))[family]
+    return FAMILY_COLOURS[family_index(family)]

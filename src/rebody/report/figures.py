@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from rebody.evaluation.results import EpisodeResult, Results
 from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TASKS, TRUTH, figure
-from rebody.tasks import FAMILIES
+from rebody.tasks import FAMILIES, family_index
 
 FAMILY_COLOURS = (MOTION, BELIEF, IDLE)
 
@@ -124,4 +124,4 @@ def draw_errors(axes: Axes, episodes: list[EpisodeResult], **style: Any) -> None
 
 
 def _unit(family: str) -> str:
-    return next(f.unit for f in FAMILIES if f.name == family)
+    return FAMILIES[family_index(family)].unit

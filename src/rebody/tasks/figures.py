@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from rebody.tasks.families import FAMILIES, VELOCITY
+from rebody.tasks.families import FAMILIES, VELOCITY, family_index
 from rebody.types import DECISION_DT, GlobalState, Task
 
 LAST_S = 2.0
@@ -21,7 +21,7 @@ def final_error(task: Task, state: GlobalState, start: float = 0.0) -> Float[np.
     the first [m].
     """
     judged = [np.asarray(getattr(state, family.field), float) for family in FAMILIES]
-    judged[VELOCITY] = _mean_velocity(np.asarray(state.x, float), start)
+    judged[VELOCITY] = mean_velocity(np.asarray(state.x, float), start)
     last = round(LAST_S / DECISION_DT)
     return np.abs(_of_family(task, judged)[-last:] - task.target).mean(axis=0)
 
@@ -36,12 +36,12 @@ def ripple(state: GlobalState) -> Float[np.ndarray, "*episode"]:
     """Std over the last 2 s of the 0.1 s velocity about its 1 s mean [m/s]; states are [time, *episode]."""
     last = round(LAST_S / DECISION_DT)
     position, velocity = np.asarray(state.x, float), np.asarray(state.vx, float)
-    return np.std((velocity - _mean_velocity(position, 0.0))[-last:], axis=0)
+    return np.std((velocity - mean_velocity(position))[-last:], axis=0)
 
 
 def tolerance(family: str) -> float:
     """Within which final error an episode counts as solved [m, m/s, rad]."""
-    return next(f.tolerance for f in FAMILIES if f.name == family)
+    return FAMILIES[family_index(family)].tolerance
 
 
 def _of_family(task: Task, by_family: list[Series]) -> Series:
@@ -50,7 +50,8 @@ def _of_family(task: Task, by_family: list[Series]) -> Series:
     return np.take_along_axis(np.stack(by_family), chosen[None], axis=0)[0]
 
 
-def _mean_velocity(position: Series, start: float) -> Series:
+def mean_velocity(position: Series, start: float = 0.0) -> Series:
+    """Displacement over the last second, per second [m/s]; `start` is x before the first position [m]."""
     steps = round(MEAN_S / DECISION_DT)
     before = np.concatenate([np.full((steps, *position.shape[1:]), start), position])[: len(position)]
     return (position - before) / MEAN_S

@@ -17,7 +17,8 @@ from rebody.training.ring import draw
 from rebody.training.step_predictor import StepPredictorConfig
 from rebody.training.step_predictor.chase import advance, begin
 from rebody.training.step_predictor.choosers import Chooser, Fixed
-from rebody.training.step_predictor.train import collect, initial_state, learn
+from rebody.training.step_predictor.train import collect, initial_state
+from rebody.training.transitions import learn
 
 ROBOTS, JOINTS = 5, 17
 STEPS = (1, 2, 3, 7, 20)
@@ -146,6 +147,6 @@ def test_it_learns_what_pays():
     ended = SACBatch(seen, action, reward, seen, np.ones(1000, np.float32))
     batches = draw(ended, 1000, (config.updates, config.sac.batch_size), rng)
     policy = sac.initial_state(1, 1, config.sac, jax.random.key(0))
-    policy, _ = learn(policy, batches, jax.random.key(1), config)
+    policy, _ = learn(policy, batches, jax.random.key(1), config.sac)
     wanted = steps_of(eqx.filter_jit(policy.actor)(np.array([[0.0], [1.0]], np.float32)))
     np.testing.assert_allclose(wanted, [1, 10], atol=1)

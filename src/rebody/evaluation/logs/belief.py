@@ -13,7 +13,7 @@ from rebody.agents.parts import Inference
 from rebody.evaluation.logs.file import COLUMNS, REWARD, TIME
 from rebody.evaluation.logs.resample import Decisions
 from rebody.store.files import written_whole
-from rebody.tasks import FAMILIES
+from rebody.tasks import FAMILIES, family_index
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class BeliefOverTime:
     def conclusion(self) -> str:
         """What is believed at the end, and since when."""
         last = self.readings[-1]
-        family = next(family for family in FAMILIES if family.name == last.family)
+        family = FAMILIES[family_index(last.family)]
         is_same = self.believes(last.family)
         is_close = is_same & (np.abs(self.targets - last.target) <= family.tolerance)
         return (

@@ -100,7 +100,7 @@ FIGURES = {
             first.train_tracker_again,
             first.draw_tracker_training,
             "Learning `tracker-cheetah`: errors on 100 held-out goals within 5 m (left) and 100 held-out speeds "
-            "of +-[1, 3] m/s (right), told to the tracker, at every 50th iteration.",
+            "of +-[1, 3] m/s (right), told to the tracker, at each dot.",
         ),
         ThesisFigure(
             "6.8",

@@ -1,8 +1,10 @@
 """Section 6.4.2 of the thesis: one module for goals and speeds, front and back."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from rebody.agents.parts import load_inference
@@ -15,6 +17,7 @@ from rebody.tasks.task_file import TaskSpec
 from rebody.training.inference import PRESETS, train_inference
 from rebody.types import Task
 
+Latents = Float[np.ndarray, "time episode latent"]
 BASE_TASKS = {
     2 * GOAL + 1: ("goal in front", "#b5403c"),
     2 * GOAL: ("goal behind", "#2b6f9e"),
@@ -85,12 +88,22 @@ def projections() -> Data:
     from sklearn.manifold import TSNE
 
     data = on_toy()
-    latents = data["latent"][FROM::EVERY]
-    flat = latents.reshape(-1, latents.shape[-1])
+    latents = late_latents(data)
     return {name: data[name] for name in ("family", "target")} | {
-        "tsne": TSNE(random_state=0).fit_transform(flat).reshape(*latents.shape[:2], 2),
-        "pca": PCA(2).fit_transform(flat).reshape(*latents.shape[:2], 2).astype(np.float32),
+        "tsne": in_plane(latents, TSNE(random_state=0).fit_transform),
+        "pca": in_plane(latents, PCA(2).fit_transform),
     }
+
+
+def late_latents(data: Data) -> Latents:
+    """Those that are shown, when something is known."""
+    return data["latent"][FROM::EVERY]
+
+
+def in_plane(latents: Latents, projection: Callable[[np.ndarray], np.ndarray]) -> Float[np.ndarray, "time episode 2"]:
+    """Latents by a projection of rows to two dimensions."""
+    flat = projection(latents.reshape(-1, latents.shape[-1]))
+    return flat.reshape(*latents.shape[:2], 2).astype(np.float32)
 
 
 def tasks_of_each_kind(speeds: tuple[float, float] = (-np.inf, np.inf)) -> list[TaskSpec]:

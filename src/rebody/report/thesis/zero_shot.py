@@ -2,16 +2,20 @@
 
 from pathlib import Path
 
-import numpy as np
-from jaxtyping import Float
-
 from rebody.agents.parts import load_inference, load_slots_of, load_tracker
 from rebody.bodies import load_robot
 from rebody.evaluation.evaluate import Trial
 from rebody.report.style import figure
 from rebody.report.thesis.data import Data, trajectories
 from rebody.report.thesis.panels import caption
-from rebody.report.thesis.several_families import EVERY, FROM, on_toy, points_panel, tasks_of_each_kind, ways_panels
+from rebody.report.thesis.several_families import (
+    in_plane,
+    late_latents,
+    on_toy,
+    points_panel,
+    tasks_of_each_kind,
+    ways_panels,
+)
 
 MODULE = "goal-velocity"
 DRAWN = ("time_s", "position_m", "velocity_m_s", "family", "target")
@@ -27,11 +31,10 @@ def on_robot(robot: str) -> Data:
     module, spec = load_inference(MODULE), load_robot(robot)
     trial = Trial("reuse", module, spec, load_tracker(f"tracker-{robot}"), slots=load_slots_of(module, None))
     episodes = trajectories(trial, tasks_of_each_kind(spec.reach.speed))
-    here, on_the_toy = _late(episodes), _late(on_toy())
-    plane = PCA(2).fit(on_the_toy.reshape(-1, on_the_toy.shape[-1]))
+    plane, on_the_toy = PCA(2), late_latents(on_toy())
     return {name: episodes[name] for name in DRAWN} | {
-        "pca": _projected(here, plane),
-        "toy_pca": _projected(on_the_toy, plane),
+        "toy_pca": in_plane(on_the_toy, plane.fit_transform),
+        "pca": in_plane(late_latents(episodes), plane.transform),
     }
 
 
@@ -43,12 +46,3 @@ def draw_robot(data: Data, path: Path, text: str) -> None:
         points_panel(latents, data["pca"], data)
         latents.legend(frameon=False, fontsize=8, markerscale=2)
         caption(drawing, text)
-
-
-def _late(episodes: Data) -> Float[np.ndarray, "time episode latent"]:
-    return episodes["latent"][FROM::EVERY]
-
-
-def _projected(latents: Float[np.ndarray, "time episode latent"], plane) -> Float[np.ndarray, "time episode 2"]:
-    flat = plane.transform(latents.reshape(-1, latents.shape[-1]))
-    return flat.reshape(*latents.shape[:2], 2).astype(np.float32)

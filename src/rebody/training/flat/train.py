@@ -9,7 +9,6 @@ from pathlib import Path
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int, PRNGKeyArray
 
@@ -27,6 +26,7 @@ from rebody.training.flat.report import measure, save_flat
 from rebody.training.motion import motion_of
 from rebody.training.ring import draw, write
 from rebody.training.run import Metrics, Run
+from rebody.training.transitions import learn, no_transitions
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task, Transition
 
 EVALUATE_EVERY = 50
@@ -41,20 +41,11 @@ class Minds(eqx.Module):
     task: Task
 
 
-class Replay(eqx.Module):
-    """Transitions of control steps: a ring in host memory, written in place, or batches drawn from it."""
-
-    observation: Float[AnyArray, "*size feature"]
-    action: Float[AnyArray, "*size action"]
-    reward: Float[AnyArray, "*size"]
-    next_observation: Float[AnyArray, "*size feature"]
-
-
 class RunState(eqx.Module):
     """Everything that a resumed run needs; host arrays are written in place."""
 
     sac: SACState
-    replay: Replay
+    replay: SACBatch  # a ring of control steps in host memory, written in place
     minds: Minds
     physics: Float[np.ndarray, "robot state"]
     previous_qpos: Float[np.ndarray, "robot nq"]  # at the last decision
@@ -99,7 +90,7 @@ def iterate(
     minds, earned = collect(state, batch, module, config, rng, collect_key)
     stored = (iteration + 1) * config.steps * config.robots
     transitions = draw(state.replay, stored, (config.updates, config.sac.batch_size), rng)
-    policy, metrics = learn(state.sac, transitions, learn_key, config)
+    policy, metrics = learn(state.sac, transitions, learn_key, config.sac)
     state = eqx.tree_at(
         lambda s: (s.sac, s.minds, s.physics, s.iteration),
         state,
@@ -140,11 +131,12 @@ def collect(
             minds, earned = listen(module.parts.module.encoder, minds, now, module.contract.reward)
             state.previous_qpos[:] = batch.qpos
             rewards.append(np.mean(earned))
-        seen = Replay(
+        seen = SACBatch(
             observation=observation,
             action=action,
             reward=_pay(batch, before, minds.task, action, config),
             next_observation=observe(batch, minds.belief, module),
+            terminal=np.zeros(batch.size, np.float32),  # what has fallen goes on
         )
         write(state.replay, step * config.robots, seen)
         put_on_feet(batch, rng)
@@ -182,37 +174,19 @@ def listen(
     return Minds(carry, belief, now, minds.task), earned
 
 
-@eqx.filter_jit
-def learn(
-    policy: SACState, transitions: Replay, key: PRNGKeyArray, config: FlatConfig
-) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
-    """One update of soft actor-critic per batch."""
-
-    def batch_of(seen: Replay, _: PRNGKeyArray) -> SACBatch:
-        alive = jnp.zeros_like(seen.reward)
-        return SACBatch(seen.observation, seen.action, seen.reward, seen.next_observation, alive)
-
-    return sac.update_many(policy, batch_of, transitions, jax.random.split(key, config.updates), config.sac)
-
-
 def initial_state(
     config: FlatConfig, batch: RobotBatch, module: Inference, key: PRNGKeyArray, init_from: str | None = None
 ) -> RunState:
     """Robots that know nothing, an empty replay, a fresh policy or that of an artifact."""
     minds = new_minds(batch, module, key)
     features = observe(batch, minds.belief, module).shape[-1]
-    actions, rows = batch.spec.model.nu, config.replay
+    actions = batch.spec.model.nu
     policy = sac.initial_state(features, actions, config.sac, key)
     if init_from is not None:
         policy = sac.take_over(policy, load_flat(init_from).policy.actor, init_from)
     return RunState(
         sac=policy,
-        replay=Replay(
-            observation=np.zeros((rows, features), np.float32),
-            action=np.zeros((rows, actions), np.float32),
-            reward=np.zeros(rows, np.float32),
-            next_observation=np.zeros((rows, features), np.float32),
-        ),
+        replay=no_transitions(config.replay, features, actions),
         minds=minds,
         physics=batch.state,
         previous_qpos=batch.qpos.copy(),

@@ -26,7 +26,7 @@ from rebody.training.step_predictor.chase import World, advance, begin
 from rebody.training.step_predictor.choosers import Deciding, Exploring
 from rebody.training.step_predictor.config import StepPredictorConfig
 from rebody.training.step_predictor.report import measure, save_step_predictor
-from rebody.types import AnyArray
+from rebody.training.transitions import learn, no_transitions
 
 EVALUATE_EVERY = 50
 
@@ -82,7 +82,7 @@ def iterate(
     collect_key, learn_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration))
     collect(state, batch, tracker, config, rng, collect_key)
     transitions = draw(state.replay, int(state.written), (config.updates, config.sac.batch_size), rng)
-    policy, metrics = learn(state.sac, transitions, learn_key, config)
+    policy, metrics = learn(state.sac, transitions, learn_key, config.sac)
     metrics |= experience(newest(state.replay, int(state.written), int(state.written) - written))
     state = eqx.tree_at(
         lambda s: (s.sac, s.physics, s.iteration),
@@ -120,15 +120,6 @@ def experience(seen: SACBatch) -> Metrics:
     }
 
 
-@eqx.filter_jit
-def learn(
-    policy: SACState, transitions: SACBatch, key: PRNGKeyArray, config: StepPredictorConfig
-) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
-    """One update of soft actor-critic per batch."""
-    keys = jax.random.split(key, config.updates)
-    return sac.update_many(policy, lambda seen, _: seen, transitions, keys, config.sac)
-
-
 def initial_state(
     config: StepPredictorConfig, batch: RobotBatch, tracker: Tracker, key: PRNGKeyArray, init_from: str | None = None
 ) -> RunState:
@@ -138,16 +129,9 @@ def initial_state(
     policy = sac.initial_state(features, 1, config.sac, key)
     if init_from is not None:
         policy = sac.take_over(policy, load_step_predictor(init_from).predictor.actor, init_from)
-    rows = config.replay
     return RunState(
         sac=policy,
-        replay=SACBatch(
-            observation=np.zeros((rows, features), np.float32),
-            action=np.zeros((rows, 1), np.float32),
-            reward=np.zeros(rows, np.float32),
-            next_observation=np.zeros((rows, features), np.float32),
-            terminal=np.zeros(rows, np.float32),
-        ),
+        replay=no_transitions(config.replay, features, 1),
         written=np.zeros((), np.int64),
         world=begin(batch, tracker.reach, Exploring(policy.actor), config, key),
         physics=batch.state,

@@ -13,6 +13,9 @@ from rebody.control.tracker import MARGIN, Command, slots_of
 from rebody.tasks import GOAL, STAND
 from rebody.types import AnyArray, GlobalState, Subgoal, Task
 
+Share = float | Float[AnyArray, ""]
+"""Of a whole, in (0, 1]."""
+
 
 @dataclass(frozen=True)
 class CommandDistribution:
@@ -23,7 +26,9 @@ class CommandDistribution:
     zero_share: float = 0.1
     """Share of commands that ask to stand still."""
 
-    def sample(self, key: PRNGKeyArray, pitch: Float[AnyArray, "*batch"], reach: Reach, speed_share=1.0) -> Command:
+    def sample(
+        self, key: PRNGKeyArray, pitch: Float[AnyArray, "*batch"], reach: Reach, speed_share: Share = 1.0
+    ) -> Command:
         """A command for each robot, which is at that pitch [rad]; a little beyond what will be asked.
 
         `speed_share` is how much of the range of speeds is asked for.

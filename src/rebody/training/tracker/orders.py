@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int, PRNGKeyArray
 from rebody.bodies import RobotBatch
 from rebody.control.tracker import Command, of_slot
 from rebody.tasks import GOAL, STAND, VELOCITY
-from rebody.training.tracker.commands import ToyGuide
+from rebody.training.tracker.commands import Share, ToyGuide
 from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.schedule import REACHED, Schedule
 from rebody.types import AnyArray, GlobalState, Task
@@ -97,7 +97,7 @@ def commands(orders: Orders, batch: RobotBatch) -> Command:
 
 @partial(jax.jit, static_argnames="config")
 def draw_commands(
-    key: PRNGKeyArray, pitch: Float[AnyArray, " robot"], config: TrackerConfig, speed_share=1.0
+    key: PRNGKeyArray, pitch: Float[AnyArray, " robot"], config: TrackerConfig, speed_share: Share = 1.0
 ) -> Command:
     """`CommandDistribution.sample`, compiled."""
     return config.commands.sample(key, pitch, config.reach, speed_share)

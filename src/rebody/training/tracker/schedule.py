@@ -14,26 +14,27 @@ class Schedule:
     """After which a robot begins anew in its rest pose; infinite for never."""
     segment: tuple[int, int]
     """Shortest and longest order."""
-    speed_share: float
-    """Of the range of speeds."""
     change_when_reached: float
     """Chance per control step that an order that is carried out is replaced by a new one."""
+    speed_share: float = 1.0
+    """How much of the range of speeds is asked for."""
 
 
 REACHED = 0.1
 """Within this an order counts as carried out [m, m/s, rad]."""
 NARROWEST = 0.25
 """Share of the range of speeds that widening begins with."""
-_EASY = Schedule(trajectory=300.0, segment=(300, 300), speed_share=1.0, change_when_reached=0.0)
-_HARD = Schedule(trajectory=1000.0, segment=(125, 125), speed_share=1.0, change_when_reached=0.2)
+_EASY = Schedule(trajectory=300.0, segment=(300, 300), change_when_reached=0.0)
+_HARD = Schedule(trajectory=1000.0, segment=(125, 125), change_when_reached=0.2)
 
 
 def schedule(config: TrackerConfig, iteration: int, control_dt: float) -> Schedule:
     """That of an iteration."""
     if config.curriculum_iterations:
-        thesis = _EASY if iteration < config.curriculum_iterations else _HARD
-        return replace(thesis, speed_share=speed_share(config, iteration))
-    return Schedule(math.inf, segment_steps(config, control_dt), speed_share(config, iteration), 0.0)
+        lasting = _EASY if iteration < config.curriculum_iterations else _HARD
+    else:
+        lasting = Schedule(math.inf, segment_steps(config, control_dt), 0.0)
+    return replace(lasting, speed_share=speed_share(config, iteration))
 
 
 def speed_share(config: TrackerConfig, iteration: int) -> float:

@@ -21,10 +21,11 @@ from rebody.control.tracker import Command, Motion, Tracker, after, tracker_obse
 from rebody.training.motion import motion_of
 from rebody.training.ring import draw, newest, write
 from rebody.training.run import Metrics, Run
+from rebody.training.tracker.commands import Share
 from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.orders import Orders, commands, follow_guides, no_orders, renew
 from rebody.training.tracker.report import measure, save_tracker
-from rebody.training.tracker.schedule import schedule
+from rebody.training.tracker.schedule import schedule, speed_share
 from rebody.types import AnyArray
 
 EVALUATE_EVERY = 100
@@ -82,9 +83,8 @@ def iterate(state: RunState, batch: RobotBatch, config: TrackerConfig, seed: int
     collect(state, batch, config, rng, collect_key)
     written = (iteration + 1) * config.steps * config.robots
     transitions = draw(state.replay, written, (config.updates, config.sac.batch_size), rng)
-    lasting = schedule(config, iteration, batch.spec.control_dt)
-    speed_share = jnp.asarray(lasting.speed_share)  # a number would be compiled anew whenever it changes
-    policy, metrics = learn(state.sac, transitions, learn_key, config, batch.spec.control_dt, speed_share)
+    share = jnp.asarray(speed_share(config, iteration))  # a number would be compiled anew whenever it changes
+    policy, metrics = learn(state.sac, transitions, learn_key, config, batch.spec.control_dt, share)
     metrics |= experience(newest(state.replay, written, config.steps * config.robots), config, batch.spec.control_dt)
     state = eqx.tree_at(
         lambda s: (s.sac, s.physics, s.iteration),
@@ -149,18 +149,18 @@ def begin_anew(state: RunState, batch: RobotBatch, who: Bool[np.ndarray, " robot
 
 @eqx.filter_jit
 def learn(
-    policy: SACState, transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float, speed_share
+    policy: SACState, transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float, share: Share
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """One update of soft actor-critic per batch."""
 
     def batch_of(transitions: Replay, key: PRNGKeyArray) -> SACBatch:
-        return relabel(transitions, key, config, control_dt, speed_share)
+        return relabel(transitions, key, config, control_dt, share)
 
     return sac.update_many(policy, batch_of, transitions, jax.random.split(key, config.updates), config.sac)
 
 
 def relabel(
-    transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float, speed_share=1.0
+    transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float, share: Share = 1.0
 ) -> SACBatch:
     """Transitions with their own command or a new one, and the reward that it would have brought.
 
@@ -168,7 +168,7 @@ def relabel(
     """
     motion, action, reach = transitions.motion, transitions.action, config.reach
     size = len(motion.pitch)
-    fresh = config.commands.sample(key, motion.pitch - motion.turn, reach, speed_share)
+    fresh = config.commands.sample(key, motion.pitch - motion.turn, reach, share)
     renewed = jnp.arange(size) < config.relabelled * size
     command = jax.tree.map(lambda new, old: jnp.where(renewed, new, old), fresh, transitions.command)
     return SACBatch(
