@@ -51,6 +51,10 @@ def test_what_never_comes_to_pass_lasts_to_the_end(changed):
     assert medians(changed(("goal", 5.0), ("velocity", 2.0), AFTER + 1)) == (1, pytest.approx(2.0), pytest.approx(2.0))
 
 
+def test_a_change_of_the_family_alone_begins_where_it_begins(changed):
+    assert medians(changed(("goal", 2.0), ("velocity", 2.0), 4))[:2] == (1, pytest.approx(0.4))
+
+
 def test_a_target_that_moves_within_its_base_task_is_no_change(changed, result):
     assert summarise_changes([result(), changed(("goal", 5.0), ("goal", 4.0), 1)]) is None
     both = changed(("goal", 5.0), ("goal", 4.0), 1), changed(("goal", 5.0), ("goal", -4.0), 7)

@@ -43,8 +43,8 @@ def _changes_base_task(episode: "EpisodeResult") -> bool:
 
 def _first_s(episode: "EpisodeResult", holds: Bool[np.ndarray, " time"]) -> float:
     """Seconds from the change to the first decision after it at which something holds."""
-    is_new = np.array(episode.active_target) == episode.active_target[-1]
-    after = holds[np.argmax(is_new) :]
+    active = list(zip(episode.active_family, episode.active_target, strict=True))
+    after = holds[active.index(active[-1]) :]
     decisions = np.argmax(after) + 1 if after.any() else len(after)
     return float(decisions * DECISION_DT)
 
