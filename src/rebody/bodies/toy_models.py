@@ -4,10 +4,22 @@ from pathlib import Path
 
 import mujoco
 
-from rebody.bodies.toys import FullToy, MassDamper, PositionToy
+from rebody.bodies.toys import FullToy, MassDamper, PositionToy, Toy
 from rebody.types import DECISION_DT
 
 _MODELS = Path(__file__).parent / "models"
+
+
+def toy_model(toy: Toy) -> mujoco.MjModel:
+    """A model whose time step is one decision of this toy; its joints are x, and of a full toy z and pitch."""
+    match toy:
+        case FullToy():
+            return full_toy_model(toy)
+        case MassDamper():
+            return mass_damper_model(toy)
+        case PositionToy():
+            return position_toy_model(toy)
+    raise TypeError(f"no model of {toy!r}")
 
 
 def mass_damper_model(toy: MassDamper) -> mujoco.MjModel:

@@ -122,7 +122,7 @@ def run_trial(trial: Trial, agent: Agent, tasks: Task, seeds: np.ndarray) -> Epi
     if trial.robot is None:
         episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, form)
     else:
-        clock, controller = _clock(trial), _controller(trial)
+        clock, controller = _clock(trial), trial_controller(trial)
         episodes = rollout_on_robot(agent, controller, trial.robot, tasks, form, seeds, trial.on_frame, clock)
     return jax.tree.map(np.asarray, episodes)
 
@@ -150,7 +150,8 @@ def _clock(trial: Trial) -> Clock | None:
     return PredictedClock(trial.step_predictor.predictor) if trial.step_predictor else EvenClock(trial.stride)
 
 
-def _controller(trial: Trial) -> Controller:
+def trial_controller(trial: Trial) -> Controller:
+    """What moves the joints of a trial's robot."""
     if trial.agent == "flat":
         assert trial.flat is not None
         return FlatController(trial.flat.policy)

@@ -1,0 +1,143 @@
+"""A body that is watched: a robot or a point mass, stepped by what its agent says."""
+
+from abc import ABC, abstractmethod
+from collections import deque
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from rebody.agents.agent import Command
+from rebody.agents.controller import Controller
+from rebody.agents.rollout import follow
+from rebody.bodies import RobotBatch, RobotSpec
+from rebody.bodies.toy_models import toy_model
+from rebody.bodies.toys import Toy, ToyState
+from rebody.types import DECISION_DT, Belief, GlobalState
+
+
+class Body(ABC):
+    """One body; arrays of global states have the shape [1], since agents decide for many."""
+
+    model: mujoco.MjModel
+    """What is drawn."""
+    steps_per_decision: int
+
+    @property
+    def step_s(self) -> float:
+        """Seconds of one step."""
+        return DECISION_DT / self.steps_per_decision
+
+    @property
+    @abstractmethod
+    def qpos(self) -> Float[np.ndarray, " nq"]:
+        """A copy of the model's joint positions [m, rad]."""
+
+    @abstractmethod
+    def reset(self, seed: int) -> None:
+        """Put it at x = 0 at rest, with its reset noise."""
+
+    @abstractmethod
+    def step(self, command: Command, belief: Belief) -> None:
+        """One step under a command; only a policy without hierarchy looks at the belief."""
+
+    @abstractmethod
+    def push(self, change: float) -> None:
+        """Change the velocity of its centre of mass along x [m/s]."""
+
+    @abstractmethod
+    def observe(self) -> GlobalState:
+        """The body-neutral readout; velocities are means over the last 0.1 s."""
+
+    @property
+    @abstractmethod
+    def has_fallen(self) -> bool:
+        """Whether it lies on the ground."""
+
+
+class RobotBody(Body):
+    """A robot under its controller. A step is a control step."""
+
+    def __init__(self, spec: RobotSpec, controller: Controller):
+        self.model, self.steps_per_decision = spec.model, spec.steps_per_decision
+        self._controller = controller
+        self._batch = RobotBatch(spec, 1, threads=1)
+        self._trail: deque[Float[np.ndarray, "1 nq"]] = deque(maxlen=spec.steps_per_decision + 1)  # over the last 0.1 s
+
+    @property
+    def qpos(self):
+        """A copy of the joint positions."""
+        return self._batch.qpos[0].copy()
+
+    def reset(self, seed):
+        """In the rest pose, with Gymnasium's reset noise."""
+        self._batch.reset(np.random.default_rng(seed))
+        self._trail.clear()
+        self._trail.append(self._batch.qpos.copy())
+
+    def step(self, command, belief):
+        """The tracker follows the subgoal."""
+        follow(self._controller, self._batch, command.subgoal, belief)
+        self._trail.append(self._batch.qpos.copy())
+
+    def push(self, change):
+        """Every part's velocity changes alike."""
+        self._batch.push(np.array([change]))
+
+    def observe(self):
+        """By the robot's observation mapping."""
+        return self._batch.spec.observe(self._trail[-1], self._trail[0])
+
+    @property
+    def has_fallen(self):
+        """As its description defines it."""
+        return bool(self._batch.fallen[0])
+
+
+class ToyBody(Body):
+    """A nominal point mass, which takes the agent's action itself. A step is a decision."""
+
+    steps_per_decision = 1
+
+    def __init__(self, toy: Toy):
+        self.model = toy_model(toy)
+        self._toy = toy
+        self.reset(0)
+
+    @property
+    def qpos(self):
+        """x, and for a toy that has them z and pitch."""
+        state = self._state
+        return np.concatenate([state.x, state.z, state.pitch], dtype=float)[: self.model.nq]
+
+    def reset(self, seed):
+        """It has no noise."""
+        still = jnp.zeros(1)
+        self._state = self._toy.initial(still, still)
+
+    def step(self, command, belief):
+        """One decision of the toy."""
+        self._state = _advance(self._toy, self._state, command)
+
+    def push(self, change):
+        """A position toy, which moves by steps and has no momentum, does not mind."""
+        state = self._state
+        self._state = replace(state, vx=state.vx + change, drift=state.drift + change)
+
+    def observe(self):
+        """The toy's own readout."""
+        return self._toy.observe(self._state)
+
+    @property
+    def has_fallen(self):
+        """Never."""
+        return False
+
+
+@eqx.filter_jit
+def _advance(toy: Toy, state: ToyState, command: Command) -> ToyState:
+    return toy.step(state, command.action, jax.random.key(0))  # a nominal toy has no noise

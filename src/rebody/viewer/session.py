@@ -1,0 +1,123 @@
+"""What the live page shows: a body, its agent and its hidden task, simulated a step at a time."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import jax
+
+from rebody.agents.agent import Observation
+from rebody.agents.belief import Reading
+from rebody.agents.clock import begin, decide
+from rebody.agents.rollout import task_reward
+from rebody.evaluation.evaluate import Trial, check_trial, trial_agent, trial_controller
+from rebody.tasks import FAMILIES, VELOCITY
+from rebody.tasks.task_file import TaskSpec, active_tasks
+from rebody.types import DECISION_DT, GlobalState
+from rebody.viewer.body import Body, RobotBody, ToyBody
+
+REMEMBERED_S = 20.0
+"""How far back moments are kept [s]."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What there is to know after a decision."""
+
+    time_s: float
+    task: TaskSpec
+    """The hidden one."""
+    reached: dict[str, float]
+    """By family: the number that its targets are compared with [m, m/s, rad]."""
+    reward: float
+    reading: Reading
+    """What the module believes. It listens beside an agent that does without it."""
+    subgoal: TaskSpec | None
+    """What the agent asks of its tracker from now on; None where nobody asks (a point mass, a flat policy)."""
+
+
+class Session:
+    """An episode without an end, that can be meddled with."""
+
+    def __init__(self, trial: Trial, task: TaskSpec):
+        """Compiles everything, which takes seconds; RebodyError where the parts and the task do not fit together."""
+        self.trial = trial
+        self.moments: deque[Moment] = deque(maxlen=round(REMEMBERED_S / DECISION_DT))
+        self.set_task(task)
+        self.body: Body
+        if trial.robot is None:
+            self.body = ToyBody(trial.inference.toy)
+        else:
+            self.body = RobotBody(trial.robot, trial_controller(trial))
+        self.restart()
+        for _ in range(self.body.steps_per_decision):
+            self.step()
+        self.restart()
+
+    def restart(self, seed: int = 0) -> None:
+        """Back to x = 0; the agent forgets everything, the task stays."""
+        self.body.reset(seed)
+        self.pose = self.previous_pose = self.body.qpos
+        self._steps = 0
+        state = self.body.observe()
+        self._carry, self._command = begin(self._agent, state)
+        self._listener = self.trial.inference.begin(_fields(state, self.trial))
+        self.moments.clear()
+
+    def step(self) -> None:
+        """One step of the body, which takes `body.step_s`; every 0.1 s a decision follows."""
+        self.body.step(self._command, self._carry.belief)
+        self.previous_pose, self.pose = self.pose, self.body.qpos
+        self._steps += 1
+        if self._steps % self.body.steps_per_decision == 0:
+            self._decide()
+
+    @property
+    def time_s(self) -> float:
+        """Simulated seconds since the start."""
+        return self._steps * self.body.step_s
+
+    def set_task(self, task: TaskSpec) -> None:
+        """Another hidden task from now on; only the oracle is told. RebodyError if the module cannot infer it."""
+        check_trial(self.trial, [task])
+        self.task = task
+        self._tasks = active_tasks([task], 1, DECISION_DT)
+        self._agent = trial_agent(self.trial, self._tasks)
+
+    def push(self, change: float) -> None:
+        """Change the velocity of the body's centre of mass along x [m/s]."""
+        self.body.push(change)
+
+    def _decide(self) -> None:
+        state, form = self.body.observe(), self.trial.inference.contract.reward
+        earned = task_reward(jax.tree.map(lambda field: field[0], self._tasks), state, form)
+        self._carry, self._command = decide(self._agent, self._carry, Observation(state, earned))
+        reading = self._listener.update(_fields(state, self.trial), earned[0])
+        self.moments.append(
+            Moment(self.time_s, self.task, _reached(state), float(earned[0]), reading, self._subgoal())
+        )
+
+    def _subgoal(self) -> TaskSpec | None:
+        subgoal = self._command.subgoal
+        value = float(subgoal.value[0])
+        if self.trial.robot is None or not math.isfinite(value):
+            return None
+        return TaskSpec(FAMILIES[int(subgoal.slot[0])].name, value)
+
+
+def target_range(trial: Trial, family: str) -> tuple[float, float]:
+    """Smallest and largest target that the module has learned and the robot has the speed for (m, m/s, rad)."""
+    low, high = trial.inference.contract.target_ranges[family]
+    if trial.tracker is not None and family == FAMILIES[VELOCITY].name:
+        slowest, fastest = trial.tracker.tracker.reach.speed
+        low, high = max(low, slowest), min(high, fastest)
+    return low, high
+
+
+def _fields(state: GlobalState, trial: Trial) -> dict[str, float]:
+    """What the module sees."""
+    return {field: float(getattr(state, field)[0]) for field in trial.inference.contract.fields}
+
+
+def _reached(state: GlobalState) -> dict[str, float]:
+    return {family.name: float(getattr(state, family.field)[0]) for family in FAMILIES}
