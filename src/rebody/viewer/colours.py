@@ -1,0 +1,13 @@
+"""Colours of the page, alike in the scene, the plots and the text."""
+
+from rebody.report.style import BELIEF, MOTION, TRUTH
+
+HIDDEN, BELIEVED, ROBOT, SUBGOAL = TRUTH, BELIEF, MOTION, "#e07a1f"
+FAMILIES = {"goal": "#6a4c93", "velocity": "#3f8f63", "stand": "#b08900"}
+"""By name; other than those of what is hidden, believed and reached."""
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue from 0 to 255 of a colour #rrggbb."""
+    red, green, blue = bytes.fromhex(colour[1:])
+    return red, green, blue

@@ -1,0 +1,118 @@
+"""The plots over time: target against reached value, and the probabilities of the families."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+from jaxtyping import Float
+from viser import uplot
+
+from rebody.tasks import FAMILIES, GOAL
+from rebody.types import DECISION_DT
+from rebody.viewer import colours
+from rebody.viewer.session import REMEMBERED_S, Moment
+
+Series = tuple[Float[np.ndarray, " time"], ...]
+FONT = "11px system-ui, sans-serif"
+HEIGHT, PADDING = 150, (8, 12, 0, 0)
+GOAL_NAME = FAMILIES[GOAL].name
+QUANTITIES = {"goal": "position x [m]", "velocity": "velocity [m/s]", "stand": "pitch [rad]"}
+"""By family: what it is about."""
+
+
+def reached_series(moments: Sequence[Moment], family: str) -> Series:
+    """Time [s]; then the robot's value, the hidden target and the believed one, in the family's unit.
+
+    NaN where there is none: a target of another family, a time that is still to come. Only the last stretch of a
+    hidden family is shown, so that a line has no gaps.
+    """
+    elsewhere = [i for i, moment in enumerate(moments) if moment.task.family != family]
+    begins = elsewhere[-1] + 1 if elsewhere else 0
+    robot = [moment.reached[family] for moment in moments]
+    hidden = [moment.task.target if i >= begins else np.nan for i, moment in enumerate(moments)]
+    believed = [moment.reading.target if moment.reading.family == family else np.nan for moment in moments]
+    return _on_one_axis(moments, [robot, hidden, believed])
+
+
+def probability_series(moments: Sequence[Moment], families: Sequence[str]) -> Series:
+    """Time [s], and the probability of each family."""
+    return _on_one_axis(moments, [[m.reading.probabilities[family] for m in moments] for family in families])
+
+
+def _on_one_axis(moments: Sequence[Moment], values: list[list[float]]) -> Series:
+    """Of full length from the start on, so that the axis moves only when it must."""
+    length = round(REMEMBERED_S / DECISION_DT)
+    first = moments[0].time_s if moments else DECISION_DT
+    empty = [np.nan] * (length - len(moments))
+    return first + DECISION_DT * np.arange(length), *(np.array([*each, *empty], float) for each in values)
+
+
+class ReachedPlot:
+    """What the robot reaches, what is hidden, what is believed."""
+
+    def __init__(self, gui: viser.GuiApi):
+        self._family = GOAL_NAME
+        hidden, robot, believed = colours.HIDDEN, colours.ROBOT, colours.BELIEVED
+        self._plot = gui.add_uplot(
+            data=reached_series([], self._family),
+            series=(
+                {},
+                {"label": "robot", "stroke": robot, "width": 2, "points": {"show": False}},
+                {"label": "hidden", "stroke": hidden, "width": 1.5, "dash": (6, 4), "points": {"show": False}},
+                # dots, since a belief jumps; first guesses may lie anywhere and do not stretch the axis
+                {"label": "believed", "width": 0, "points": _dots(believed), "auto": False},
+            ),
+            scales={"x": {"time": False}, "y": {"range": {"min": _at_least(-1.0), "max": _at_least(1.0)}}},
+            axes=_axes(QUANTITIES[self._family]),
+            legend={"show": False},
+            height=HEIGHT,
+            padding=PADDING,
+        )
+
+    def show(self, moments: Sequence[Moment], family: str) -> None:
+        """The last seconds, in the unit of that family."""
+        if family != self._family:
+            self._family, self._plot.axes = family, _axes(QUANTITIES[family])
+        self._plot.data = reached_series(moments, family)
+
+
+class ProbabilityPlot:
+    """How sure the module is of the family."""
+
+    def __init__(self, gui: viser.GuiApi, families: Sequence[str]):
+        self._families = families
+        lines = [
+            {"label": family, "stroke": colours.FAMILIES[family], "width": 2, "points": {"show": False}}
+            for family in families
+        ]
+        self._plot = gui.add_uplot(
+            data=probability_series([], families),
+            series=({}, *lines),
+            scales={"x": {"time": False}, "y": {"range": (-0.05, 1.05)}},
+            axes=_axes("probability"),
+            legend={"show": False},
+            height=HEIGHT,
+            padding=PADDING,
+        )
+
+    def show(self, moments: Sequence[Moment]) -> None:
+        """The last seconds."""
+        self._plot.data = probability_series(moments, self._families)
+
+    def remove(self) -> None:
+        """Another module may know other families."""
+        self._plot.remove()
+
+
+def _dots(colour: str) -> uplot.Series_Points:
+    return {"show": True, "size": 3.5, "width": 0, "fill": colour}
+
+
+def _at_least(end: float) -> dict[str, float]:
+    """An end of the axis that lies here, or beyond what is drawn."""
+    return {"pad": 0.1, "soft": end, "mode": 1}
+
+
+def _axes(label: str) -> tuple[uplot.Axis, uplot.Axis]:
+    text: uplot.Axis = {"font": FONT, "labelFont": FONT, "labelGap": 0, "labelSize": 16, "gap": 2}
+    return {**text, "label": "time [s]", "size": 20}, {**text, "label": label, "size": 36}
