@@ -50,11 +50,13 @@ def parse(arguments: list[str]) -> Any:
     from rebody.cli.run import RunTask
     from rebody.cli.stress import Stress
     from rebody.cli.train import train_command
+    from rebody.cli.view import View
 
     train: Any = Annotated[train_command(arguments), tyro.conf.subcommand("train")]
     commands: Any = (
         Annotated[Demo, tyro.conf.subcommand("demo")]
         | Annotated[RunTask, tyro.conf.subcommand("run")]
+        | Annotated[View, tyro.conf.subcommand("view")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
         | Annotated[Diagnose, tyro.conf.subcommand("diagnose")]
         | Annotated[Infer, tyro.conf.subcommand("infer")]

@@ -25,6 +25,8 @@ class Body(ABC):
 
     model: mujoco.MjModel
     """What is drawn."""
+    x_address: int
+    """Where x stands in qpos."""
     steps_per_decision: int
 
     @property
@@ -64,6 +66,7 @@ class RobotBody(Body):
 
     def __init__(self, spec: RobotSpec, controller: Controller):
         self.model, self.steps_per_decision = spec.model, spec.steps_per_decision
+        self.x_address = spec.root_addresses[0]
         self._controller = controller
         self._batch = RobotBatch(spec, 1, threads=1)
         self._trail: deque[Float[np.ndarray, "1 nq"]] = deque(maxlen=spec.steps_per_decision + 1)  # over the last 0.1 s
@@ -101,7 +104,7 @@ class RobotBody(Body):
 class ToyBody(Body):
     """A nominal point mass, which takes the agent's action itself. A step is a decision."""
 
-    steps_per_decision = 1
+    x_address, steps_per_decision = 0, 1
 
     def __init__(self, toy: Toy):
         self.model = toy_model(toy)

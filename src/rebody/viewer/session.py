@@ -114,6 +114,15 @@ def target_range(trial: Trial, family: str) -> tuple[float, float]:
     return low, high
 
 
+def fitting(trial: Trial, task: TaskSpec) -> TaskSpec:
+    """That task, or the nearest that the module and the robot can be given."""
+    known = trial.inference.contract.target_ranges
+    family = task.family if task.family in known else next(iter(known))
+    low, high = target_range(trial, family)
+    target = task.target if family == task.family else high / 2
+    return TaskSpec(family, min(max(target, low), high))
+
+
 def _fields(state: GlobalState, trial: Trial) -> dict[str, float]:
     """What the module sees."""
     return {field: float(getattr(state, field)[0]) for field in trial.inference.contract.fields}

@@ -1,0 +1,132 @@
+"""The page: a session in real time, shown to and meddled with by all browsers that look."""
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+
+import viser
+
+from rebody.errors import RebodyError
+from rebody.evaluation.evaluate import Trial
+from rebody.tasks.task_file import TaskSpec
+from rebody.viewer import words
+from rebody.viewer.controls import Choice, Controls, GiveTask, Order, Push, Restart
+from rebody.viewer.pace import Pace
+from rebody.viewer.panel import BeliefPanel
+from rebody.viewer.scene import Scene
+from rebody.viewer.session import Moment, Session, fitting
+
+CONTROLS_PX = 300
+"""Width of the panel of controls."""
+FRAME_S, LATENT_S = 1 / 40, 0.25
+"""Real seconds from one picture of the body, and of the latent, to the next."""
+
+
+class Page:
+    """Runs a session; all happens in the thread of `run`, which takes orders from the controls."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        load: Callable[[Choice], Trial],
+        robots: Sequence[str],
+        inferences: Sequence[str],
+        choice: Choice,
+    ):
+        """`load` fetches what is chosen among robots and inference modules."""
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(CONTROLS_PX)
+        self.controls = Controls(server.gui, choice, robots, inferences)
+        self._server, self._load, self._choice = server, load, choice
+        self._panel: BeliefPanel | None = None
+        self._ended = threading.Event()
+
+    def run(self, task: TaskSpec) -> None:
+        """Until `end` is called; RebodyError where what comes first does not fit together."""
+        self._watch(self._choice, self._load(self._choice), task)
+        while not self._ended.wait(FRAME_S):
+            self._obey()
+            self._advance(time.monotonic())
+            self._show(time.monotonic())
+
+    def end(self) -> None:
+        """Let `run` return; any thread may call this."""
+        self._ended.set()
+
+    def _watch(self, choice: Choice, trial: Trial, task: TaskSpec) -> None:
+        """Begin a session, in place of the one before."""
+        self.controls.show_status(words.loading(choice.robot))
+        self.session = Session(trial, task)
+        self._scene = Scene(self._server, self.session.body.model)
+        if self._panel is None or choice.inference != self._choice.inference:
+            if self._panel is not None:
+                self._panel.remove()
+            self._panel = BeliefPanel(self._server.gui, trial)
+        self._choice = choice
+        self.controls.show_task(trial, task)
+        self._begin()
+
+    def _begin(self) -> None:
+        """What is remembered of an episode, at its start."""
+        self._pace = Pace(self.session.body.step_s, time.monotonic())
+        self._seen: tuple[Moment | None, TaskSpec] | None = None
+        self._drawn: Moment | None = None
+        self._latent_due = 0.0
+
+    def _obey(self) -> None:
+        """Do what was clicked; what cannot be done is said on the page."""
+        while not self.controls.orders.empty():
+            try:
+                self._carry_out(self.controls.orders.get())
+            except RebodyError as error:
+                self._complain(error)
+                self.controls.show_choice(self._choice)
+
+    def _carry_out(self, order: Order) -> None:
+        match order:
+            case Choice():
+                self.controls.show_status(words.loading(order.robot))
+                trial = self._load(order)
+                self._watch(order, trial, fitting(trial, self.session.task))
+            case GiveTask(task):
+                self.session.set_task(task)
+                self.controls.show_task(self.session.trial, task)
+            case Push(change):
+                self.session.push(change)
+            case Restart():
+                self.session.restart()
+                self._begin()
+
+    def _advance(self, now: float) -> None:
+        """Simulate what is due; time stands still where nobody looks."""
+        if self.controls.paused or not self._server.get_clients():
+            self._pace.wait(now)
+            return
+        try:
+            for _ in range(self._pace.due(now, self.controls.speed)):
+                self.session.step()
+        except RebodyError as error:  # the simulation diverged
+            self._complain(error)
+            self._carry_out(Restart())
+
+    def _show(self, now: float) -> None:
+        """Bring the page up to date with the session."""
+        session, panel = self.session, self._panel
+        assert panel is not None
+        pose = session.previous_pose + self._pace.share * (session.pose - session.previous_pose)
+        x = float(pose[session.body.x_address])
+        moment = session.moments[-1] if session.moments else None
+        self._scene.show_body(pose, x)
+        self._scene.show_marks(session.task, moment, x)
+        self.controls.show_status(words.status(session, self._pace.reached, self.controls.paused))
+        if (moment, session.task) != self._seen:
+            self._seen = (moment, session.task)
+            panel.show(session.task, [*session.moments])
+        if moment is not self._drawn and now >= self._latent_due:
+            self._drawn, self._latent_due = moment, now + LATENT_S
+            panel.show_latent([*session.moments])
+
+    def _complain(self, error: RebodyError) -> None:
+        for client in self._server.get_clients().values():
+            client.add_notification("This does not work", str(error), color="red", auto_close_seconds=12.0)

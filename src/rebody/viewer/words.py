@@ -1,0 +1,92 @@
+"""What the page says."""
+
+import html
+from collections.abc import Sequence
+
+from rebody.agents.build import AGENTS
+from rebody.tasks import FAMILIES, family_index
+from rebody.tasks.task_file import TaskSpec
+from rebody.viewer import colours
+from rebody.viewer.session import Moment, Session
+
+INTRODUCTION = """
+The robot was given a **hidden task**. Nobody tells it: all it hears is a reward, how far off it is, ten times a second.
+A module that learned on a point mass works out what is wanted. **Change the task, push the robot**, and watch.
+"""
+GUIDE = f"""
+**In the middle.** The robot; the view follows it along *x*, drag to turn, scroll to zoom. Poles mark goals [m], arrows
+speeds [m/s], or point to a goal that is farther away than the picture shows.
+
+**Black, dashed: the hidden task.** Reach a position (*goal*), run at a speed (*velocity*), or hold a pitch (*stand*).
+
+**Red: the belief**, as a linear probe reads it from the module's latent. It starts at nothing and needs a few decisions.
+
+**Orange: the subgoal** that the agent asks of the robot's tracker, a policy that moves the joints.
+
+**Blue: the robot**, what it reaches.
+
+**Probability.** Which kind of task the module believes in.
+
+**Latent.** Each dot is a belief, ten per second, in the colour of the believed kind; the red ellipse is the newest
+one's uncertainty. Grey ellipses are clusters that the module found on the point mass, without labels. All ellipses
+reach two standard deviations.
+
+**Agents.** {"; ".join(f"*{name}*: {what}" for name, what in AGENTS.items())}. Whoever acts, the module listens, and its
+belief is what is drawn.
+"""
+
+
+def dot(colour: str) -> str:
+    """A small disc in front of a word, as HTML."""
+    return (
+        f'<span style="display:inline-block;width:.7em;height:.7em;border-radius:50%;background:{colour};'
+        'margin-right:.45em"></span>'
+    )
+
+
+def loading(robot: str) -> str:
+    """While parts are fetched and compiled, as HTML."""
+    return _line(f"<b>Getting {html.escape(robot)} ready</b>: fetching its parts and compiling, some seconds…")
+
+
+def status(session: Session, speed: float, is_paused: bool) -> str:
+    """What goes on, as HTML."""
+    going = "paused" if is_paused else f"{speed:.1f} × real time" if speed else "starting"
+    fallen = '<br><b style="color:#c0392b">It has fallen. Press Restart.</b>' if session.body.has_fallen else ""
+    return _line(f"<b>{session.time_s:.1f} s</b>, {going}{fallen}")
+
+
+def _line(html_text: str) -> str:
+    return f'<div style="font-size:.82em;padding:0 0 .3em 1em">{html_text}</div>'
+
+
+def family_legend(families: Sequence[str]) -> str:
+    """Which line is which, as HTML."""
+    names = " &nbsp; ".join(dot(colours.FAMILIES[family]) + family for family in families)
+    return _line(f"Kind of task: {names}")
+
+
+def legend(task: TaskSpec, moment: Moment | None) -> str:
+    """The numbers of this moment, in the colours of the plots, as HTML."""
+    rows = [(colours.HIDDEN, "hidden task", named(task.family, task.target))]
+    believed = reached = "nothing yet"
+    if moment is not None:
+        reading = moment.reading
+        chance = reading.probabilities[reading.family]
+        believed = f"{named(reading.family, reading.target)}, {100 * chance:.0f} % sure of the kind"
+        reached = value(task.family, moment.reached[task.family])
+    rows += [(colours.BELIEVED, "believed", believed), (colours.ROBOT, "robot", reached)]
+    if moment is not None and moment.subgoal is not None:
+        rows.append((colours.SUBGOAL, "subgoal", named(moment.subgoal.family, moment.subgoal.target)))
+    lines = "".join(f"<tr><td>{dot(c)}{name}</td><td><b>{says}</b></td></tr>" for c, name, says in rows)
+    return f'<table style="font-size:.82em;line-height:1.45;width:100%;margin:0 0 0 .9em">{lines}</table>'
+
+
+def named(family: str, target: float) -> str:
+    """A task in words."""
+    return f"{family} {value(family, target)}"
+
+
+def value(family: str, number: float) -> str:
+    """A number with its unit."""
+    return f"{number:+.2f} {FAMILIES[family_index(family)].unit}"
