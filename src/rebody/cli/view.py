@@ -40,7 +40,7 @@ class View:
     def run(self) -> None:
         """Show the page until Ctrl-C; RebodyError where parts do not fit or the extra is missing."""
         try:
-            from rebody.viewer.controls import Choice
+            from rebody.viewer.controls import Choice, Offered
             from rebody.viewer.page import Page
             from rebody.viewer.server import serving
         except ModuleNotFoundError as error:
@@ -48,12 +48,13 @@ class View:
                 raise
             raise RebodyError("the live page needs more packages: install with `pip install 'rebody[view]'`.") from None
         choice, task = Choice(self.robot, self.inference, self.agent), parse_task(self.task)
-        check_trial(self._load(choice), [task])
-        robots = _with((POINT_MASS, *shipped_robots()), self.robot)
-        modules = _with([name for name, kind in shipped_artifacts() if kind == "inference"], self.inference)
+        trial = self._load(choice)
+        check_trial(trial, [task])
+        modules = [name for name, kind in shipped_artifacts() if kind == "inference"]
+        offered = Offered(_with([POINT_MASS, *shipped_robots()], self.robot), _with(modules, self.inference))
         with serving(self.port) as server:
             Console().print("Open that address in a browser. Ctrl-C ends the page.")
-            Page(server, self._load, robots, modules, choice).run(task)
+            Page(server, offered, self._load, choice, trial, task).run()
 
     def _load(self, choice: "Choice") -> Trial:
         """What was chosen on the page; parts that were named are of the robot and the module that were named."""
@@ -69,6 +70,6 @@ class View:
         ).load()
 
 
-def _with(shipped: tuple[str, ...] | list[str], own: str) -> list[str]:
+def _with(shipped: list[str], own: str) -> list[str]:
     """The shipped names and one's own."""
     return [*shipped, *([] if own in shipped else [own])]

@@ -1,5 +1,6 @@
 """The panel of controls: what is clicked becomes an order to the page."""
 
+import math
 import queue
 import random
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.session import target_range
 
-PUSHES = {"← 1": -1.0, "← ½": -0.5, "½ →": 0.5, "1 →": 1.0}
+PUSHES = {"-1": -1.0, "-0.5": -0.5, "+0.5": 0.5, "+1": 1.0}
 """What buttons say, and what they add to the velocity [m/s]."""
 SPEEDS = (0.1, 2.0)
 """Slowest and fastest simulation, in simulated seconds per second."""
@@ -29,6 +30,14 @@ class Choice:
     robot: str
     inference: str
     agent: str
+
+
+@dataclass(frozen=True)
+class Offered:
+    """What there is to choose from, beside the agents."""
+
+    robots: Sequence[str]
+    inferences: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -56,25 +65,31 @@ Order = Choice | GiveTask | Push | Restart
 class Controls:
     """Widgets; orders wait in `orders` until the page gets to them."""
 
-    def __init__(self, gui: viser.GuiApi, choice: Choice, robots: Sequence[str], inferences: Sequence[str]):
+    def __init__(self, gui: viser.GuiApi, offered: Offered, choice: Choice):
         self.orders: queue.SimpleQueue[Order] = queue.SimpleQueue()
         self.paused = False
         self._ranges: dict[str, tuple[float, float]] = {}
         gui.add_markdown(words.INTRODUCTION)
         self._status = gui.add_html("")
         with gui.add_folder("Hidden task"):
-            self._family = gui.add_dropdown("Kind", family_names(), hint="goal: reach a place; velocity: run; stand: pitch")
+            self._family = gui.add_dropdown(
+                "Kind", family_names(), hint="goal: reach a place; velocity: run; stand: hold a pitch"
+            )
             self._target = gui.add_slider("Target", 0.0, 1.0, 0.1, 0.0)
             self._give = gui.add_button("Change the task now", icon=viser.Icon.TARGET)
             self._draw = gui.add_button("Any other task", icon=viser.Icon.DICE, color="gray")
         with gui.add_folder("The robot"):
-            self._pushes = gui.add_button_group("Push [m/s]", tuple(PUSHES), hint="Changes the velocity of all its parts")
-            self._speed = gui.add_slider("Speed [×]", *SPEEDS, 0.1, 1.0, hint="Simulated seconds per second")
+            self._pushes = gui.add_button_group(
+                "Push [m/s]", tuple(PUSHES), hint="Changes the velocity of all its parts"
+            )
+            self._speed = gui.add_slider("Speed [x]", *SPEEDS, 0.1, 1.0, hint="Simulated seconds per second")
             self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
             self._restart = gui.add_button("Restart", icon=viser.Icon.REFRESH, color="gray")
         with gui.add_folder("Who is watched"):
-            self._robot = gui.add_dropdown("Robot", robots, initial_value=choice.robot)
-            self._inference = gui.add_dropdown("Module", inferences, initial_value=choice.inference, hint="The inference artifact")
+            self._robot = gui.add_dropdown("Robot", offered.robots, initial_value=choice.robot)
+            self._inference = gui.add_dropdown(
+                "Module", offered.inferences, initial_value=choice.inference, hint="The inference artifact"
+            )
             self._agent = gui.add_dropdown("Agent", tuple(AGENTS), initial_value=choice.agent)
         self._connect()
 
@@ -89,7 +104,8 @@ class Controls:
 
     def show_task(self, trial: Trial, task: TaskSpec) -> None:
         """The hidden task, and which others there are."""
-        self._ranges = {name: target_range(trial, name) for name in trial.inference.contract.target_ranges}
+        families = trial.inference.contract.target_ranges
+        self._ranges = {name: _in_tenths(*target_range(trial, name)) for name in families}
         self._family.options = tuple(self._ranges)
         self._family.value = task.family
         self._show_range(task.family, task.target)
@@ -122,7 +138,7 @@ class Controls:
         low, high = self._ranges[family]
         self._target.label = f"Target [{FAMILIES[family_index(family)].unit}]"
         self._target.min, self._target.max = low, high
-        self._target.value = high / 2 if target is None else target
+        self._target.value = round(high / 2, 1) if target is None else target
 
     def _any_task(self) -> TaskSpec:
         family = random.choice(list(self._ranges))
@@ -131,3 +147,7 @@ class Controls:
         while abs(target) < FARTHEST_DRAWN * max(abs(low), abs(high)):
             target = round(random.uniform(low, high), 1)
         return TaskSpec(family, target)
+
+
+def _in_tenths(low: float, high: float) -> tuple[float, float]:
+    return math.ceil(10 * low) / 10, math.floor(10 * high) / 10

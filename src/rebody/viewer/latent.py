@@ -22,7 +22,7 @@ SHOWN = 50
 """Decisions that the belief's trail goes back."""
 LATENT, PROJECTED = ("latent 1", "latent 2"), ("main direction 1", "main direction 2")
 CLUSTER = "#8a8a8a"
-SIZE, DPI = (3.3, 2.5), 200
+SIZE, DPI = (3.3, 2.05), 200
 """Inches, and pixels per inch: twice what a panel shows, so that it is sharp on any screen."""
 
 

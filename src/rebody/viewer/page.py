@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import viser
 
@@ -10,13 +10,13 @@ from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import Trial
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
-from rebody.viewer.controls import Choice, Controls, GiveTask, Order, Push, Restart
+from rebody.viewer.controls import Choice, Controls, GiveTask, Offered, Order, Push, Restart
 from rebody.viewer.pace import Pace
 from rebody.viewer.panel import BeliefPanel
 from rebody.viewer.scene import Scene
 from rebody.viewer.session import Moment, Session, fitting
 
-CONTROLS_PX = 300
+CONTROLS_PX = 320
 """Width of the panel of controls."""
 FRAME_S, LATENT_S = 1 / 40, 0.25
 """Real seconds from one picture of the body, and of the latent, to the next."""
@@ -28,23 +28,26 @@ class Page:
     def __init__(
         self,
         server: viser.ViserServer,
+        offered: Offered,
         load: Callable[[Choice], Trial],
-        robots: Sequence[str],
-        inferences: Sequence[str],
         choice: Choice,
+        trial: Trial,
+        task: TaskSpec,
     ):
-        """`load` fetches what is chosen among robots and inference modules."""
+        """`load` fetches what is chosen among what is offered; choice, trial and task are those to begin with."""
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(CONTROLS_PX)
-        self.controls = Controls(server.gui, choice, robots, inferences)
-        self._server, self._load, self._choice = server, load, choice
-        self._panel: BeliefPanel | None = None
+        self.controls = Controls(server.gui, offered, choice)
+        self.controls.show_task(trial, task)
+        self._panel = BeliefPanel(server.gui, trial.inference)
+        self._server, self._load = server, load
         self._ended = threading.Event()
+        self._first = (choice, trial, task)
 
-    def run(self, task: TaskSpec) -> None:
-        """Until `end` is called; RebodyError where what comes first does not fit together."""
-        self._watch(self._choice, self._load(self._choice), task)
+    def run(self) -> None:
+        """Until `end` is called."""
+        self._watch(*self._first)
         while not self._ended.wait(FRAME_S):
             self._obey()
             self._advance(time.monotonic())
@@ -59,10 +62,7 @@ class Page:
         self.controls.show_status(words.loading(choice.robot))
         self.session = Session(trial, task)
         self._scene = Scene(self._server, self.session.body.model)
-        if self._panel is None or choice.inference != self._choice.inference:
-            if self._panel is not None:
-                self._panel.remove()
-            self._panel = BeliefPanel(self._server.gui, trial)
+        self._panel.listen_to(trial.inference)
         self._choice = choice
         self.controls.show_task(trial, task)
         self._begin()
@@ -112,8 +112,7 @@ class Page:
 
     def _show(self, now: float) -> None:
         """Bring the page up to date with the session."""
-        session, panel = self.session, self._panel
-        assert panel is not None
+        session = self.session
         pose = session.previous_pose + self._pace.share * (session.pose - session.previous_pose)
         x = float(pose[session.body.x_address])
         moment = session.moments[-1] if session.moments else None
@@ -122,10 +121,10 @@ class Page:
         self.controls.show_status(words.status(session, self._pace.reached, self.controls.paused))
         if (moment, session.task) != self._seen:
             self._seen = (moment, session.task)
-            panel.show(session.task, [*session.moments])
+            self._panel.show(session.task, [*session.moments])
         if moment is not self._drawn and now >= self._latent_due:
             self._drawn, self._latent_due = moment, now + LATENT_S
-            panel.show_latent([*session.moments])
+            self._panel.show_latent([*session.moments])
 
     def _complain(self, error: RebodyError) -> None:
         for client in self._server.get_clients().values():

@@ -4,47 +4,57 @@ from collections.abc import Sequence
 
 import viser
 
-from rebody.evaluation.evaluate import Trial
+from rebody.agents.parts import Inference
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.latent import LatentPicture
 from rebody.viewer.plots import ProbabilityPlot, ReachedPlot
 from rebody.viewer.session import Moment
 
-WIDTH = 340
-"""Of the panel in pixels."""
+PANEL_PX = 340
+"""Its width."""
 
 
 class BeliefPanel:
     """Numbers, two plots over time, and the latent; a second tab explains it all."""
 
-    def __init__(self, gui: viser.GuiApi, trial: Trial):
-        self._panel = gui.add_panel()
-        families = tuple(trial.inference.contract.target_ranges)
-        parts = trial.inference.parts
-        latent = parts.module.encoder.prior().mean.shape[-1]
-        with self._panel.add_tab("What it believes"):
-            self._legend = gui.add_html("")
+    def __init__(self, gui: viser.GuiApi, inference: Inference):
+        panel = gui.add_panel()
+        self._gui = gui
+        self._tab = panel.add_tab("What it believes")
+        with self._tab:
+            self._numbers = gui.add_html("")
             self._reached = ReachedPlot(gui)
-            self._families = gui.add_html(words.family_legend(families))
-            self._probabilities = ProbabilityPlot(gui, families)
-            self._picture = LatentPicture(latent, parts.mixture)
-            self._latent = gui.add_image(self._picture.draw([]), format="png")
-        with self._panel.add_tab("What you see"):
+        self._listen_to(inference)
+        with panel.add_tab("What you see"):
             gui.add_markdown(words.GUIDE)
-        self._panel.dock_left()
-        self._panel.set_width(WIDTH)
+        panel.dock_left()
+        panel.set_width(PANEL_PX)
+
+    def listen_to(self, inference: Inference) -> None:
+        """Show another module's beliefs from now on."""
+        if inference is not self._inference:
+            for part in (self._families, self._probabilities, self._latent):
+                part.remove()
+            self._listen_to(inference)
 
     def show(self, task: TaskSpec, moments: Sequence[Moment]) -> None:
         """All but the latent."""
-        self._legend.content = words.legend(task, moments[-1] if moments else None)
+        self._numbers.content = words.numbers(task, moments[-1] if moments else None)
         self._reached.show(moments, task.family)
         self._probabilities.show(moments)
 
     def show_latent(self, moments: Sequence[Moment]) -> None:
         """The latent, which takes the longest to draw."""
-        self._latent.image = self._picture.draw([moment.reading for moment in moments])
+        picture = self._picture.draw([moment.reading for moment in moments])
+        self._latent.content = words.picture(picture, "The latent, and the clusters in it")
 
-    def remove(self) -> None:
-        """Another module believes other things."""
-        self._panel.remove()
+    def _listen_to(self, inference: Inference) -> None:
+        families, parts = tuple(inference.contract.target_ranges), inference.parts
+        self._inference = inference
+        self._picture = LatentPicture(parts.module.encoder.prior().mean.shape[-1], parts.mixture)
+        with self._tab:
+            self._families = self._gui.add_html(words.family_legend(families))
+            self._probabilities = ProbabilityPlot(self._gui, families)
+            self._latent = self._gui.add_html("")
+        self.show_latent([])

@@ -7,17 +7,19 @@ import viser
 from jaxtyping import Float
 from viser import uplot
 
-from rebody.tasks import FAMILIES, GOAL
+from rebody.tasks import FAMILIES, GOAL, family_index
 from rebody.types import DECISION_DT
 from rebody.viewer import colours
 from rebody.viewer.session import REMEMBERED_S, Moment
 
 Series = tuple[Float[np.ndarray, " time"], ...]
 FONT = "11px system-ui, sans-serif"
-HEIGHT, PADDING = 150, (8, 12, 0, 0)
+REACHED_PX, PROBABILITY_PX, PADDING = 135, 88, (6, 12, 0, 0)
 GOAL_NAME = FAMILIES[GOAL].name
 QUANTITIES = {"goal": "position x [m]", "velocity": "velocity [m/s]", "stand": "pitch [rad]"}
 """By family: what it is about."""
+LOOSE: uplot.Series = {"auto": False}
+"""Has no say in where its axis ends."""
 
 
 def reached_series(moments: Sequence[Moment], family: str) -> Series:
@@ -32,6 +34,14 @@ def reached_series(moments: Sequence[Moment], family: str) -> Series:
     hidden = [moment.task.target if i >= begins else np.nan for i, moment in enumerate(moments)]
     believed = [moment.reading.target if moment.reading.family == family else np.nan for moment in moments]
     return _on_one_axis(moments, [robot, hidden, believed])
+
+
+def limits(values: Sequence[Float[np.ndarray, " time"]], family: str) -> tuple[float, float]:
+    """Ends of an axis, around 0 and all values."""
+    shown = np.append(np.concatenate(values), 0.0)
+    low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
+    margin = 0.1 * max(high - low, FAMILIES[family_index(family)].floor)
+    return low - margin, high + margin
 
 
 def probability_series(moments: Sequence[Moment], families: Sequence[str]) -> Series:
@@ -54,18 +64,19 @@ class ReachedPlot:
         self._family = GOAL_NAME
         hidden, robot, believed = colours.HIDDEN, colours.ROBOT, colours.BELIEVED
         self._plot = gui.add_uplot(
-            data=reached_series([], self._family),
+            data=_with_limits(reached_series([], self._family), self._family),
             series=(
                 {},
-                {"label": "robot", "stroke": robot, "width": 2, "points": {"show": False}},
-                {"label": "hidden", "stroke": hidden, "width": 1.5, "dash": (6, 4), "points": {"show": False}},
-                # dots, since a belief jumps; first guesses may lie anywhere and do not stretch the axis
-                {"label": "believed", "width": 0, "points": _dots(believed), "auto": False},
+                {**LOOSE, "label": "robot", "stroke": robot, "width": 2, "points": {"show": False}},
+                {**LOOSE, "label": "hidden", "stroke": hidden, "width": 1.5, "dash": (6, 4), "points": {"show": False}},
+                # dots, since a belief jumps
+                {**LOOSE, "label": "believed", "width": 0, "points": _dots(believed)},
+                {"width": 0, "points": {"show": False}},
             ),
-            scales={"x": {"time": False}, "y": {"range": {"min": _at_least(-1.0), "max": _at_least(1.0)}}},
+            scales={"x": {"time": False}},
             axes=_axes(QUANTITIES[self._family]),
             legend={"show": False},
-            height=HEIGHT,
+            height=REACHED_PX,
             padding=PADDING,
         )
 
@@ -73,7 +84,7 @@ class ReachedPlot:
         """The last seconds, in the unit of that family."""
         if family != self._family:
             self._family, self._plot.axes = family, _axes(QUANTITIES[family])
-        self._plot.data = reached_series(moments, family)
+        self._plot.data = _with_limits(reached_series(moments, family), family)
 
 
 class ProbabilityPlot:
@@ -91,7 +102,7 @@ class ProbabilityPlot:
             scales={"x": {"time": False}, "y": {"range": (-0.05, 1.05)}},
             axes=_axes("probability"),
             legend={"show": False},
-            height=HEIGHT,
+            height=PROBABILITY_PX,
             padding=PADDING,
         )
 
@@ -108,11 +119,18 @@ def _dots(colour: str) -> uplot.Series_Points:
     return {"show": True, "size": 3.5, "width": 0, "fill": colour}
 
 
-def _at_least(end: float) -> dict[str, float]:
-    """An end of the axis that lies here, or beyond what is drawn."""
-    return {"pad": 0.1, "soft": end, "mode": 1}
+def _with_limits(series: Series, family: str) -> Series:
+    """And a last one, not to be seen, whose values are the axis' ends by turns.
+
+    uPlot cannot find the ends by itself where values are missing, and would draw a chart anew to be told them. First
+    guesses of the belief may lie anywhere: they do not count.
+    """
+    time, robot, hidden, _ = series
+    return *series, np.resize(limits([robot, hidden], family), len(time))
 
 
 def _axes(label: str) -> tuple[uplot.Axis, uplot.Axis]:
-    text: uplot.Axis = {"font": FONT, "labelFont": FONT, "labelGap": 0, "labelSize": 16, "gap": 2}
-    return {**text, "label": "time [s]", "size": 20}, {**text, "label": label, "size": 36}
+    text: uplot.Axis = {"font": FONT, "labelFont": FONT, "labelGap": 0, "labelSize": 15, "gap": 2}
+    text["ticks"] = {"size": 4, "width": 1}
+    text["grid"] = {"width": 1}
+    return {**text, "label": "time [s]", "size": 18}, {**text, "label": label, "size": 34}

@@ -80,7 +80,7 @@ class Mark:
         self._place.visible, self._arrow.visible = is_near, target is not None and not is_near
         if target is None:
             return
-        text = f"{self._name} {target.family} {target.target:.1f} {FAMILIES[family_index(target.family)].unit}"
+        text = f"{self._name}: {target.family} {target.target:.1f} {FAMILIES[family_index(target.family)].unit}"
         if is_near:
             self._place.position = (target.target, 0.0, 0.0)
             self._pole_label.text = text

@@ -93,9 +93,7 @@ class Session:
         earned = task_reward(jax.tree.map(lambda field: field[0], self._tasks), state, form)
         self._carry, self._command = decide(self._agent, self._carry, Observation(state, earned))
         reading = self._listener.update(_fields(state, self.trial), earned[0])
-        self.moments.append(
-            Moment(self.time_s, self.task, _reached(state), float(earned[0]), reading, self._subgoal())
-        )
+        self.moments.append(Moment(self.time_s, self.task, _reached(state), float(earned[0]), reading, self._subgoal()))
 
     def _subgoal(self) -> TaskSpec | None:
         subgoal = self._command.subgoal

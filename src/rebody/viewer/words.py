@@ -1,7 +1,13 @@
 """What the page says."""
 
+import base64
 import html
+import io
 from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import UInt8
+from PIL import Image
 
 from rebody.agents.build import AGENTS
 from rebody.tasks import FAMILIES, family_index
@@ -10,8 +16,8 @@ from rebody.viewer import colours
 from rebody.viewer.session import Moment, Session
 
 INTRODUCTION = """
-The robot was given a **hidden task**. Nobody tells it: all it hears is a reward, how far off it is, ten times a second.
-A module that learned on a point mass works out what is wanted. **Change the task, push the robot**, and watch.
+The robot has a **hidden task**. All it hears is a reward: how far off it is. A module that learned on a point mass
+works out what is wanted. **Change the task, push the robot**, and watch.
 """
 GUIDE = f"""
 **In the middle.** The robot; the view follows it along *x*, drag to turn, scroll to zoom. Poles mark goals [m], arrows
@@ -19,7 +25,8 @@ speeds [m/s], or point to a goal that is farther away than the picture shows.
 
 **Black, dashed: the hidden task.** Reach a position (*goal*), run at a speed (*velocity*), or hold a pitch (*stand*).
 
-**Red: the belief**, as a linear probe reads it from the module's latent. It starts at nothing and needs a few decisions.
+**Red: the belief**, as a linear probe reads it from the module's latent, and how sure it is of the kind. It begins with
+a guess.
 
 **Orange: the subgoal** that the agent asks of the robot's tracker, a policy that moves the joints.
 
@@ -51,7 +58,7 @@ def loading(robot: str) -> str:
 
 def status(session: Session, speed: float, is_paused: bool) -> str:
     """What goes on, as HTML."""
-    going = "paused" if is_paused else f"{speed:.1f} × real time" if speed else "starting"
+    going = "paused" if is_paused else f"{speed:.1f} x real time" if speed else "starting"
     fallen = '<br><b style="color:#c0392b">It has fallen. Press Restart.</b>' if session.body.has_fallen else ""
     return _line(f"<b>{session.time_s:.1f} s</b>, {going}{fallen}")
 
@@ -66,20 +73,29 @@ def family_legend(families: Sequence[str]) -> str:
     return _line(f"Kind of task: {names}")
 
 
-def legend(task: TaskSpec, moment: Moment | None) -> str:
+def numbers(task: TaskSpec, moment: Moment | None) -> str:
     """The numbers of this moment, in the colours of the plots, as HTML."""
     rows = [(colours.HIDDEN, "hidden task", named(task.family, task.target))]
     believed = reached = "nothing yet"
     if moment is not None:
         reading = moment.reading
         chance = reading.probabilities[reading.family]
-        believed = f"{named(reading.family, reading.target)}, {100 * chance:.0f} % sure of the kind"
+        believed = f"{named(reading.family, reading.target)} ({100 * chance:.0f} % sure)"
         reached = value(task.family, moment.reached[task.family])
     rows += [(colours.BELIEVED, "believed", believed), (colours.ROBOT, "robot", reached)]
     if moment is not None and moment.subgoal is not None:
         rows.append((colours.SUBGOAL, "subgoal", named(moment.subgoal.family, moment.subgoal.target)))
     lines = "".join(f"<tr><td>{dot(c)}{name}</td><td><b>{says}</b></td></tr>" for c, name, says in rows)
-    return f'<table style="font-size:.82em;line-height:1.45;width:100%;margin:0 0 0 .9em">{lines}</table>'
+    return f'<table style="font-size:.82em;line-height:1.35;margin-left:.9em">{lines}</table>'
+
+
+def picture(pixels: UInt8[np.ndarray, "height width 3"], says: str) -> str:
+    """A picture as wide as its panel, as HTML. (viser's own images may be gone before a slow browser has read them.)"""
+    png = io.BytesIO()
+    Image.fromarray(pixels).save(png, "png", compress_level=1)
+    data = base64.b64encode(png.getvalue()).decode()
+    # decoded at once, since the picture before is gone: it would flicker
+    return f'<img alt="{says}" decoding="sync" style="width:100%;padding:.3em .7em 0 .7em" src="data:image/png;base64,{data}">'
 
 
 def named(family: str, target: float) -> str:
