@@ -96,7 +96,7 @@ class LatentPicture:
         self._canvas.restore_region(self._background)
         for k, share in readings[-1].responsibilities.items():
             self._draw_cluster(k, share)
-        freshness = np.linspace(0.1, 1.0, len(readings))
+        freshness = np.linspace(1.0, 0.1, len(readings))[::-1]  # the newest is in full colour
         families = [colours.FAMILIES[reading.family] for reading in readings]
         self._trail.set(offsets=points, sizes=4 + 20 * freshness**4, facecolors=[*map(to_rgba, families, freshness)])
         self._axes.draw_artist(self._trail)
@@ -106,7 +106,7 @@ class LatentPicture:
 
     def _add_clusters(self, mixture: MixturePrior) -> dict[int, tuple[Ellipse, Text]]:
         clusters = {}
-        for k in np.flatnonzero(mixture.active):
+        for k in np.flatnonzero(mixture.active).tolist():
             mean, covariance = component(mixture, k, len(self._plane.origin))
             mean, covariance = self._plane.points(mean), self._plane.covariance(covariance)
             outline = _outline(mean, covariance)
@@ -115,7 +115,7 @@ class LatentPicture:
             top = (mean[0], mean[1] + STDS * covariance[1, 1] ** 0.5)
             text = self._axes.annotate("", top, (0, 1), textcoords="offset points", ha="center", fontsize=6.5)
             text.set_animated(True)
-            clusters[int(k)] = (ellipse, text)
+            clusters[k] = (ellipse, text)
         return clusters
 
     def _draw_cluster(self, k: int, share: float) -> None:

@@ -95,7 +95,8 @@ def picture(pixels: UInt8[np.ndarray, "height width 3"], says: str) -> str:
     Image.fromarray(pixels).save(png, "png", compress_level=1)
     data = base64.b64encode(png.getvalue()).decode()
     # decoded at once, since the picture before is gone: it would flicker
-    return f'<img alt="{says}" decoding="sync" style="width:100%;padding:.3em .7em 0 .7em" src="data:image/png;base64,{data}">'
+    style = "width:100%;padding:.3em .7em 0 .7em"
+    return f'<img alt="{says}" decoding="sync" style="{style}" src="data:image/png;base64,{data}">'
 
 
 def named(family: str, target: float) -> str:

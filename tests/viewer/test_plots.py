@@ -1,0 +1,52 @@
+"""What the plots over time are given."""
+
+import numpy as np
+import pytest
+
+from rebody.agents.belief import Reading
+from rebody.tasks.task_file import TaskSpec
+from rebody.types import Belief
+
+pytest.importorskip("viser")
+from rebody.viewer.plots import limits, probability_series, reached_series
+from rebody.viewer.session import REMEMBERED_S, Moment
+
+LENGTH = round(REMEMBERED_S / 0.1)
+
+
+def moment(i: int, hidden: TaskSpec, believed: str) -> Moment:
+    latent = Belief(np.zeros(2), np.ones(2))
+    probabilities = {"goal": 0.8, "velocity": 0.2} if believed == "goal" else {"goal": 0.3, "velocity": 0.7}
+    reading = Reading(believed, 10.0 + i, probabilities, {}, latent)
+    return Moment(0.1 * (i + 1), hidden, {"goal": 1.0 * i, "velocity": 2.0 * i, "stand": 0.0}, -1.0, reading, None)
+
+
+GOAL, RUN = TaskSpec("goal", 4.0), TaskSpec("velocity", 1.5)
+MOMENTS = [moment(0, RUN, "velocity"), moment(1, GOAL, "goal"), moment(2, RUN, "goal"), moment(3, RUN, "velocity")]
+
+
+def test_targets_are_shown_in_the_unit_of_one_family():
+    time, robot, hidden, believed = reached_series(MOMENTS, "velocity")
+    nan = np.nan
+    np.testing.assert_allclose(time, 0.1 * np.arange(1, LENGTH + 1))
+    np.testing.assert_array_equal(robot[:5], [0.0, 2.0, 4.0, 6.0, nan])
+    np.testing.assert_array_equal(hidden[:5], [nan, nan, 1.5, 1.5, nan])  # the last stretch alone
+    np.testing.assert_array_equal(believed[:5], [10.0, nan, nan, 13.0, nan])
+    assert {len(series) for series in (time, robot, hidden, believed)} == {LENGTH}
+
+
+def test_probabilities_have_a_line_each():
+    _, goal, velocity = probability_series(MOMENTS, ["goal", "velocity"])
+    np.testing.assert_array_equal(goal[:4], [0.3, 0.8, 0.8, 0.3])
+    np.testing.assert_allclose(goal[:4] + velocity[:4], 1.0)
+
+
+def test_before_anything_happened_the_axes_are_there():
+    time, *series = reached_series([], "goal")
+    assert time[0] == pytest.approx(0.1)
+    assert np.isnan(series).all()
+    assert limits(series, "goal") == pytest.approx((-0.1, 0.1))
+
+
+def test_an_axis_holds_zero_and_all_values():
+    assert limits([np.array([2.0, np.nan]), np.array([4.0, 3.0])], "goal") == pytest.approx((-0.4, 4.4))
