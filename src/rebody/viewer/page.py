@@ -46,12 +46,15 @@ class Page:
         self._first = (choice, trial, task)
 
     def run(self) -> None:
-        """Until `end` is called."""
+        """Until `end` is called; time stands still while nobody looks."""
         self._watch(*self._first)
         while not self._ended.wait(FRAME_S):
             self._obey()
-            self._advance(time.monotonic())
-            self._show(time.monotonic())
+            if self._server.get_clients():
+                self._advance(time.monotonic())
+                self._show(time.monotonic())
+            else:
+                self._pace.wait(time.monotonic())
 
     def end(self) -> None:
         """Let `run` return; any thread may call this."""
@@ -99,8 +102,8 @@ class Page:
                 self._begin()
 
     def _advance(self, now: float) -> None:
-        """Simulate what is due; time stands still where nobody looks."""
-        if self.controls.paused or not self._server.get_clients():
+        """Simulate what is due."""
+        if self.controls.paused:
             self._pace.wait(now)
             return
         try:

@@ -92,7 +92,7 @@ class ProbabilityPlot:
 
     def __init__(self, gui: viser.GuiApi, families: Sequence[str]):
         self._families = families
-        lines = [
+        lines: list[uplot.Series] = [
             {"label": family, "stroke": colours.FAMILIES[family], "width": 2, "points": {"show": False}}
             for family in families
         ]

@@ -75,34 +75,34 @@ class Mark:
 
     def show(self, target: TaskSpec | None, x: float) -> None:
         """That target, seen from a body at x [m]; nothing where there is none."""
-        is_goal = target is not None and family_index(target.family) == GOAL
-        is_near = is_goal and abs(target.target - x) <= EDGE_M
-        self._place.visible, self._arrow.visible = is_near, target is not None and not is_near
         if target is None:
+            self._place.visible = self._arrow.visible = False
             return
-        text = f"{self._name}: {target.family} {target.target:.1f} {FAMILIES[family_index(target.family)].unit}"
+        family = family_index(target.family)
+        text = f"{self._name}: {target.family} {target.target:.1f} {FAMILIES[family].unit}"
+        is_near = family == GOAL and abs(target.target - x) <= EDGE_M
+        self._place.visible, self._arrow.visible = is_near, not is_near
         if is_near:
             self._place.position = (target.target, 0.0, 0.0)
             self._pole_label.text = text
-            return
-        start, tip = self._arrow_of(target, x)
-        self._arrow.points = np.array([[start, tip]], np.float32)
-        self._arrow_label.text = text
-        self._arrow_label.position = start
-        self._arrow_label.anchor = "center-right" if tip[0] >= start[0] else "center-left"
+        else:
+            start, along = _arrow(family, target.target, x)
+            start[2] += self._height
+            self._arrow.points = np.array([[start, start + along]], np.float32)
+            self._arrow_label.text, self._arrow_label.position = text, start
+            self._arrow_label.anchor = "center-right" if along[0] >= 0 else "center-left"
 
-    def _arrow_of(self, target: TaskSpec, x: float) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
-        """From where to where it goes, beside the body."""
-        start = np.array([0.0, 0.0, self._height])
-        match family_index(target.family):
-            case f if f == VELOCITY:
-                along = np.array([ARROW_M * target.target, 0.0, 0.0])
-            case f if f == STAND:
-                along = np.array([math.sin(target.target), 0.0, math.cos(target.target)])
-            case _:
-                side = math.copysign(1.0, target.target - x)
-                start[0], along = side * EDGE_M, np.array([side * ARROW_M, 0.0, 0.0])
-        return start, start + along
+
+def _arrow(family: int, target: float, x: float) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """Where an arrow begins, beside a body at x [m], and how it goes on [m]."""
+    start = np.zeros(3)
+    if family == VELOCITY:
+        return start, np.array([ARROW_M * target, 0.0, 0.0])
+    if family == STAND:
+        return start, np.array([math.sin(target), 0.0, math.cos(target)])
+    side = math.copysign(1.0, target - x)
+    start[0] = side * EDGE_M
+    return start, np.array([side * ARROW_M, 0.0, 0.0])
 
 
 class Ruler:
