@@ -40,10 +40,10 @@ def check_robot_of(part: LoadedTracker | LoadedFlat | LoadedStepPredictor, spec:
     """RebodyError if a policy was trained on another robot, or on another description of it."""
     if part.robot != spec.name:
         raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{spec.name}'.")
-    if isinstance(part, LoadedTracker) and part.tracker.joints != spec.joints:
+    if isinstance(part, LoadedTracker) and part.tracker.joints != spec.tracker_inputs:
         raise RebodyError(
             f"'{part.name}' was trained on another description of '{spec.name}': it sees {part.tracker.joints} numbers "
-            f"of the body, which now gives {spec.joints}. Train it anew (rebody train tracker --robot {spec.name})."
+            f"of the body, which now gives {spec.tracker_inputs}. Train it anew (rebody train tracker --robot {spec.name})."
         )
 
 
