@@ -35,31 +35,37 @@ def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) 
 
 
 def plot_episode(episode: EpisodeResult, path: Path) -> None:
-    """One episode: what was reached, what was believed, what was asked of the tracker."""
-    with figure(path, 3, 1, size=(8.0, 7.5)) as (_, (reached, rewards, latents)):
-        draw_progress(reached, episode)
+    """One episode: what was reached and believed of each family that was asked for, the reward, the latent."""
+    families = episode.families
+    rows = len(families) + 2
+    with figure(path, rows, 1, size=(8.0, 2.5 * rows)) as (_, (*reached, rewards, latents)):
+        for axes, family in zip(reached, families, strict=True):
+            draw_progress(axes, episode, family)
         rewards.plot(episode.time_s, episode.reward, color=MOTION)
         rewards.set(ylabel="reward: all that is heard", xlabel="time [s]")
         latents.plot(episode.time_s, episode.latent)
         latents.set(ylabel="latent mean", xlabel="time [s]")
 
 
-def draw_progress(axes: Axes, episode: EpisodeResult, until: int | None = None) -> None:
-    """Reached, believed and true value over time, up to a decision."""
-    unit = _unit(episode.active_family[-1])
-    reached = episode.reached
-    axes.plot(episode.time_s, episode.active_target, "--", color=TRUTH, label="hidden target")
-    axes.plot(episode.time_s[:until], episode.inferred_target[:until], color=BELIEF, label="read from the belief")
-    axes.plot(episode.time_s[:until], reached[:until], color=MOTION, lw=2, label="robot")
-    spread = [*reached, *episode.active_target]
-    margin = 0.25 * max(np.ptp(spread), 1.0)
+def draw_progress(axes: Axes, episode: EpisodeResult, family: str, until: int | None = None) -> None:
+    """What a family is about, up to a decision: reached, read from the belief, and true while it was asked."""
+    time, reached = np.array(episode.time_s), np.array(episode.reached_of(family))
+    wanted = np.where(np.equal(episode.active_family, family), episode.active_target, np.nan)
+    read = np.where(np.equal(episode.inferred_family, family), episode.inferred_target, np.nan)
+    axes.plot(time, wanted, "--", color=TRUTH, label="hidden target")
+    axes.plot(time[:until], read[:until], ".", color=BELIEF, ms=4, label="read from the belief")
+    axes.plot(time[:until], reached[:until], color=MOTION, lw=1.5, label="robot")
+    spread = [*reached, *wanted[np.isfinite(wanted)]]
+    margin = 0.15 * max(np.ptp(spread), 1.0)
     axes.set(
         xlabel="time [s]",
-        ylabel=f"{episode.active_family[-1]} [{unit}]",
-        xlim=(0, episode.time_s[-1]),
+        ylabel=f"{family} [{_unit(family)}]",
+        xlim=(0, time[-1]),
         ylim=(min(spread) - margin, max(spread) + margin),
     )
-    axes.legend(loc="lower right", frameon=False, fontsize=8)
+    axes.set_title(" ", fontsize=8)  # room for the legend, which must not push panels apart
+    legend = axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False, fontsize=8, borderaxespad=0)
+    legend.set_in_layout(False)
 
 
 def _trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:

@@ -155,7 +155,7 @@ def hold(batch: RobotBatch, controller: TrackerController, subgoal: Subgoal) -> 
 def shaped(
     earned: Float[np.ndarray, "*robot"], fell: Bool[np.ndarray, "*robot"], config: HighLevelConfig
 ) -> Float[np.ndarray, "*robot"]:
-    """What is learned from: the task's scaled reward, a pull on arrival that is a function of it, a price for a fall."""
+    """The task's scaled reward, a pull on arrival that is a function of it, a price for a fall."""
     arrival = config.arrival * config.arrival_width / (config.arrival_width - earned)
     return (earned + arrival - config.fall * fell).astype(np.float32)
 
