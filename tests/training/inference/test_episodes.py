@@ -121,16 +121,6 @@ def test_episodes_start_anywhere_at_any_speed(config, state):
     assert abs(np.corrcoef(started.x[:, 0], started.vx[:, 0])[0, 1]) < 0.2
 
 
-def test_starts_may_be_denser_near_home(config, state):
-    near = replace(config, episodes=400, decisions=1, start=(8.0, 2.0), start_power=2.0)
-    started = collect(state.module, state.sac.actor, TOY, near, roles(400, True), jax.random.key(2)).state
-    x, vx = np.abs(started.x[:, 0]), np.abs(started.vx[:, 0])
-    assert 7.0 < x.max() <= 8.0
-    assert np.mean(x < 2.0) == pytest.approx(0.5, abs=0.08)
-    assert np.mean(started.x[:, 0] < 0) == pytest.approx(0.5, abs=0.08)
-    assert np.mean(vx < 1.0) == pytest.approx(0.5, abs=0.08)  # speeds stay even
-
-
 def test_nothing_is_believed_before_the_first_transition(episodes):
     assert not np.asarray(episodes.belief.mean)[:, 0].any()
     assert (np.asarray(episodes.belief.variance)[:, 0] == 1).all()

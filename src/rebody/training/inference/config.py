@@ -68,11 +68,7 @@ class MetaConfig:
     observation_noise: float = 0.0
     """Variance of the noise on every observed field (thesis, captions of 6.20)."""
     start: tuple[float, float] = (12.0, 3.0)
-    """Episodes start at random x [m] and uniformly random vx [m/s] within these, a full toy at any pitch that it can
-    hold."""
-    start_power: float = 1.0
-    """Power of a uniform number that x starts at: 1 for evenly, more for denser near home. Far from home a module
-    learns to read targets where runs end; near it a policy learns the last centimetres."""
+    """Episodes start at uniformly random x [m] and vx [m/s] within these, a full toy at any pitch that it can hold."""
     turn_probability: float = 0.15
     """Chance per decision that a wandering toy changes its mind. It must come to see goals from both sides: while it
     stays on one, a belief in their mirror image explains all that it hears."""

@@ -105,9 +105,8 @@ def refresh_beliefs(encoder: Encoder, episodes: Episodes) -> Episodes:
 def _random_start(toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> ToyState:
     """Anywhere, at any speed, so that the latent cannot take the start for the task."""
     where_key, disturbance_key = jax.random.split(key)
-    unit = jax.random.uniform(where_key, (3, config.episodes), minval=-1.0)
-    unit = jnp.sign(unit) * jnp.abs(unit) ** jnp.asarray([config.start_power, 1.0, 1.0])[:, None]
-    x, vx, pitch = unit * jnp.asarray([*config.start, toy.max_pitch])[:, None]
+    reach = jnp.asarray([*config.start, toy.max_pitch])[:, None]
+    x, vx, pitch = jax.random.uniform(where_key, (3, config.episodes), minval=-1.0) * reach
     shape = (config.episodes,)
     nominal = jnp.arange(config.episodes) < config.episodes // 2
     disturbance = jax.tree.map(

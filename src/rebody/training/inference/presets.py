@@ -76,8 +76,7 @@ def goal_velocity() -> MetaConfig:
         arrival_width=0.02,
         policy_fields=("vx",),
         policy_scales=(3.0,),
-        start=(30.0, 3.0),
-        start_power=2.0,
+        start=(15.0, 3.0),
         turn_probability=0.08,
         switch_share=0.5,
         episodes=96,
@@ -95,7 +94,7 @@ def goal_velocity_thesis() -> MetaConfig:
         base,
         tasks=TaskDistribution((*_both_ways("goal", 1.0, 25.0), *_both_ways("velocity", 0.5, 3.0))),
         inference=replace(base.inference, scales=(17.0, 3.0)),
-        start=(50.0, 3.0),
+        start=(25.0, 3.0),
     )
 
 
@@ -124,8 +123,6 @@ def goal_velocity_stand() -> MetaConfig:
         inference=replace(base.inference, fields=("x", "vx", "pitch"), scales=(10.0, 3.0, 1.5), latent=9, kinds=3),
         policy_fields=("vx", "pitch", "pitch_rate"),
         policy_scales=(3.0, 1.5, 3.0),
-        start=(15.0, 3.0),
-        start_power=1.0,
         joint_iterations=95,
         sac=replace(base.sac, decay_updates=61_000),
     )
