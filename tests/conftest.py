@@ -44,7 +44,7 @@ from rebody.training.step_predictor import report as step_report  # noqa: E402
 from rebody.training.tracker import report as tracker_report  # noqa: E402
 
 WINDOW, SECONDS = 6, 3.0
-JOINTS, ACTIONS = 17, 6  # of a cheetah; its tracker sees the pace, too
+JOINTS, ACTIONS = 17, 6  # of a cheetah
 
 # parts that nothing was learned for: enough to tell whether they are put together rightly
 
@@ -85,7 +85,7 @@ def lively_actor(observations: int, seed: int, actions: int = ACTIONS) -> Actor:
 
 @pytest.fixture(scope="session")
 def tracker():
-    return Tracker(lively_actor(JOINTS + 1 + 6, 1), Reach(speed=(-3.0, 3.0)))
+    return Tracker(lively_actor(JOINTS + 6, 1), Reach(speed=(-3.0, 3.0)))
 
 
 @pytest.fixture(scope="session")
@@ -95,7 +95,7 @@ def flat_policy():
 
 @pytest.fixture(scope="session")
 def step_predictor(tracker):
-    return StepPredictor(lively_actor(JOINTS + 1 + 6, 3, actions=1), tracker.reach)
+    return StepPredictor(lively_actor(JOINTS + 6, 3, actions=1), tracker.reach)
 
 
 @pytest.fixture(scope="session")

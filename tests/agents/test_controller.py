@@ -5,13 +5,11 @@ import pytest
 
 from rebody.agents.controller import FlatController, TrackerController
 from rebody.agents.rollout import joint_action
-from rebody.bodies import RobotBatch
 from rebody.control.tracker import Command
 from rebody.tasks import GOAL, VELOCITY
 from rebody.types import Belief, Subgoal
 
 JOINTS = np.linspace(-1, 1, 34, dtype=np.float32).reshape(2, 17)
-TRACKED = np.concatenate([JOINTS, np.array([[0.3], [-0.2]], np.float32)], axis=-1)  # with the pace
 X = np.full(2, 3.0, np.float32)
 LEVEL = np.zeros(2, np.float32)
 SUBGOAL = Subgoal(np.array([GOAL, VELOCITY]), np.array([4.0, 2.0], np.float32))
@@ -29,30 +27,21 @@ def believing(flat_policy):
     return FlatController(flat_policy)
 
 
-def test_a_tracker_sees_the_pace_and_a_flat_policy_does_not(cheetah, following, believing):
-    batch = RobotBatch(cheetah, 2)
-    batch.push(np.array([1.0, -1.0]))
-    batch.step(np.zeros((2, 6)))
-    np.testing.assert_array_equal(following.see(batch)[:, :-1], believing.see(batch))
-    np.testing.assert_allclose(following.see(batch)[:, -1], batch.pace, rtol=1e-6)
-    assert np.abs(batch.pace).min() > 0.01
-
-
 def test_the_tracker_is_told_the_distance(tracker, following):
-    expected = tracker(TRACKED, Command(SUBGOAL.slot, np.array([1.0, 2.0], np.float32)))
-    np.testing.assert_allclose(joint_action(following, TRACKED, X, LEVEL, SUBGOAL, None), expected, atol=1e-6)
+    expected = tracker(JOINTS, Command(SUBGOAL.slot, np.array([1.0, 2.0], np.float32)))
+    np.testing.assert_allclose(joint_action(following, JOINTS, X, LEVEL, SUBGOAL, None), expected, atol=1e-6)
 
 
 def test_a_far_goal_is_shown_nearer_and_a_speed_as_it_is(tracker):
-    expected = tracker(TRACKED, Command(SUBGOAL.slot, np.array([0.5, 2.0], np.float32)))
+    expected = tracker(JOINTS, Command(SUBGOAL.slot, np.array([0.5, 2.0], np.float32)))
     cautious = TrackerController(tracker, goal_ahead=0.5)
-    np.testing.assert_allclose(joint_action(cautious, TRACKED, X, LEVEL, SUBGOAL, None), expected, atol=1e-6)
+    np.testing.assert_allclose(joint_action(cautious, JOINTS, X, LEVEL, SUBGOAL, None), expected, atol=1e-6)
 
 
 def test_a_tracker_does_not_look_at_the_belief(following):
-    action = joint_action(following, TRACKED, X, LEVEL, SUBGOAL, None)
-    np.testing.assert_array_equal(joint_action(following, TRACKED, X, LEVEL, SUBGOAL, BELIEF), action)
-    assert np.abs(joint_action(following, TRACKED, X + 1, LEVEL, SUBGOAL, None)[0] - action[0]).max() > 1e-3
+    action = joint_action(following, JOINTS, X, LEVEL, SUBGOAL, None)
+    np.testing.assert_array_equal(joint_action(following, JOINTS, X, LEVEL, SUBGOAL, BELIEF), action)
+    assert np.abs(joint_action(following, JOINTS, X + 1, LEVEL, SUBGOAL, None)[0] - action[0]).max() > 1e-3
 
 
 def test_a_flat_policy_does_not_look_at_the_subgoal(believing):

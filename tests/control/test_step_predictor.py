@@ -7,7 +7,7 @@ from rebody.control.step_predictor import step_reward, steps_of
 from rebody.control.tracker import Command
 from rebody.tasks import GOAL, VELOCITY
 
-JOINTS = np.linspace(-1, 1, 3 * 18, dtype=np.float32).reshape(3, 18)
+JOINTS = np.linspace(-1, 1, 3 * 17, dtype=np.float32).reshape(3, 17)
 
 
 def command(*values, slot=GOAL):

@@ -20,7 +20,7 @@ from rebody.training.step_predictor.choosers import Chooser, Fixed
 from rebody.training.step_predictor.train import collect, initial_state
 from rebody.training.transitions import learn
 
-ROBOTS, JOINTS = 5, 18
+ROBOTS, JOINTS = 5, 17
 STEPS = (1, 2, 3, 7, 20)
 """How long each robot holds its subgoals."""
 

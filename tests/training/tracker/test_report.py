@@ -31,7 +31,7 @@ def test_no_speed_beyond_the_reach_is_held_out(ends):
 def test_a_tracker_that_does_nothing_misses_by_what_was_asked(monkeypatch):
     monkeypatch.setattr(report, "SECONDS", 3.0)
     cheetah, reach = load_robot("cheetah"), Reach(speed=(-3.0, 3.0), pitch=(-1.0, 1.0))
-    still = jax.tree.map(lambda leaf: 0 * leaf, Actor(18 + 10, 6, SACConfig(hidden=(4,)), jax.random.key(0)))
+    still = jax.tree.map(lambda leaf: 0 * leaf, Actor(17 + 10, 6, SACConfig(hidden=(4,)), jax.random.key(0)))
     figures = measure(Tracker(still, reach), cheetah)
     assert figures.keys() == {
         "goal median", "goal p95", "velocity median", "velocity p95", "stand median", "stand p95", "zero speed", "fell",
