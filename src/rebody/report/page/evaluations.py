@@ -47,7 +47,7 @@ def _errors(family: Family, compared: Mapping[str, Results], axes: Axes) -> None
     styles = cycle(product(("-", "--", ":"), (MOTION, BELIEF, IDLE, ORACLE, TRUTH)))
     for (label, results), (line, colour) in zip(compared.items(), styles, strict=False):
         if episodes := results.of(family.name):
-            draw_errors(axes, episodes, label=label, color=colour, ls=line)
+            draw_errors(axes, episodes, label=label.replace("$", r"\$"), color=colour, ls=line)  # no formula
     axes.set(title=f"{family.name}: final errors", xlabel=f"final error [{family.unit}]")
     axes.set(ylabel="episodes with at most this error [%]")
     axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(0.0, -0.2))  # names may be long

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from rebody.errors import RebodyError
 from rebody.evaluation.reading import holds_results, read_results
 from rebody.evaluation.results import Results
-from rebody.store import load_artifact, read_meta, recover, shipped_artifacts
+from rebody.store import load_artifact, read_meta, shipped_artifacts
 from rebody.store.artifact import HASHED, MANIFEST, WEIGHTS
 from rebody.training.run import read_log
 
@@ -32,6 +32,11 @@ class Training:
     """Markdown; None as long as the run is not finished."""
     log: dict[str, Float[np.ndarray, " iteration"]]
     """A column per measurement, NaN where nothing was measured."""
+
+    @property
+    def iterations(self) -> int:
+        """How many are done."""
+        return len(next(iter(self.log.values()), ()))
 
 
 @dataclass(frozen=True)
@@ -55,10 +60,11 @@ def find(reference: str) -> Found:
     if reference in dict(shipped_artifacts()):
         shipped = load_artifact(reference)
         return Found(reference, "shipped with rebody", _training(shipped.path), {}, [], [], [])
-    recover(path)
     if path.is_dir():
         return _in_folder(path)
     if path.is_file():
+        if not holds_results(path):
+            raise RebodyError(f"{path} holds no results of an evaluation. {EXPECTED}")
         return Found(path.name, reference, None, {path: read_results(path)}, [], [], [])
     raise RebodyError(f"there is no '{reference}'. {EXPECTED}")
 
