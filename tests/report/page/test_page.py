@@ -150,11 +150,13 @@ def test_an_artifact_that_measured_nothing(tmp_path):
     assert "other, 0 iterations" in (tmp_path / "report.html").read_text()
 
 
-def test_a_name_with_dollars_is_no_formula(written, tmp_path):
-    for name in ("$a$.json", "$b_.json"):
+def test_many_long_names_fit(written, tmp_path):
+    names = [f"{'very ' * 20}long, the ${i}$th <one>.json" for i in range(16)]
+    for name in names:
         (tmp_path / name).write_bytes((written.demo / "reuse.json").read_bytes())
     write_page([find(str(tmp_path))], tmp_path / "report.html")
-    assert "$a$.json" in Page((tmp_path / "report.html").read_text()).text
+    text = Page((tmp_path / "report.html").read_text()).text
+    assert all(name in text for name in names)
 
 
 @pytest.mark.parametrize("make", [lambda path: path.mkdir(), lambda path: path.write_text("{}"), lambda path: None])

@@ -10,8 +10,7 @@ from jaxtyping import Float
 from markupsafe import Markup
 from matplotlib.axes import Axes
 
-from rebody.report.page.drawing import panel
-from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TRUTH
+from rebody.report.page.drawing import CURVES, panel
 from rebody.tasks import FAMILIES
 
 Log = Mapping[str, Float[np.ndarray, " iteration"]]
@@ -140,7 +139,7 @@ def learning_curves(log: Log) -> dict[str, Markup]:
 
 
 def _draw(each: Panel, log: Log, axes: Axes) -> None:
-    colours = cycle((MOTION, BELIEF, IDLE, ORACLE, TRUTH))
+    colours = cycle(CURVES)
     for column, label in each.columns.items():
         if _measured(log, column):
             there = np.isfinite(log[column])

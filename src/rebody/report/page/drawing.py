@@ -15,6 +15,8 @@ from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TRUTH, figure
 
 COLOURS = {TRUTH: "truth", BELIEF: "belief", MOTION: "motion", ORACLE: "oracle", IDLE: "idle"}
 """CSS variables that take the place of colours: they are lighter on a dark page."""
+CURVES = (MOTION, BELIEF, IDLE, ORACLE, TRUTH)
+"""Colours of lines that stand for nothing else."""
 SIZE = (4.8, 3.4)
 ON_PAGE = {
     "svg.fonttype": "none",  # letters stay letters

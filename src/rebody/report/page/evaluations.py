@@ -1,6 +1,6 @@
 """Figures of results and of what they tell together."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
 from itertools import cycle, product
 from typing import Any
@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 
 from rebody.evaluation.results import Results
 from rebody.report.figures import draw_beliefs, draw_errors, draw_readings, draw_trajectories
-from rebody.report.page.drawing import panel
-from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TRUTH
+from rebody.report.page.drawing import CURVES, panel
 from rebody.tasks import FAMILIES, Family
 
 
@@ -37,6 +36,11 @@ def figures_of(results: Results) -> dict[str, Markup]:
     }
 
 
+def legend(compared: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Line and colour of each evaluation, beside the figures: there is room for long names, and for many."""
+    return dict(zip(compared, cycle(product(("solid", "dashed", "dotted"), CURVES)), strict=False))
+
+
 def errors_of(compared: Mapping[str, Results]) -> dict[str, Markup]:
     """Of each family, which share of episodes has at most which error, a line per evaluation."""
     families = [family for family in FAMILIES if any(results.of(family.name) for results in compared.values())]
@@ -44,10 +48,8 @@ def errors_of(compared: Mapping[str, Results]) -> dict[str, Markup]:
 
 
 def _errors(family: Family, compared: Mapping[str, Results], axes: Axes) -> None:
-    styles = cycle(product(("-", "--", ":"), (MOTION, BELIEF, IDLE, ORACLE, TRUTH)))
-    for (label, results), (line, colour) in zip(compared.items(), styles, strict=False):
-        if episodes := results.of(family.name):
-            draw_errors(axes, episodes, label=label.replace("$", r"\$"), color=colour, ls=line)  # no formula
+    for name, (line, colour) in legend(compared).items():
+        if episodes := compared[name].of(family.name):
+            draw_errors(axes, episodes, color=colour, ls=line)
     axes.set(title=f"{family.name}: final errors", xlabel=f"final error [{family.unit}]")
     axes.set(ylabel="episodes with at most this error [%]")
-    axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(0.0, -0.2))  # names may be long

@@ -17,8 +17,8 @@ from rebody.evaluation.results import Results
 from rebody.evaluation.tables import summary_table
 from rebody.report.diagnosis import plot_diagnosis
 from rebody.report.page.curves import learning_curves
-from rebody.report.page.drawing import inline
-from rebody.report.page.evaluations import errors_of, figures_of, settings_of
+from rebody.report.page.drawing import COLOURS, inline
+from rebody.report.page.evaluations import errors_of, figures_of, legend, settings_of
 from rebody.report.page.find import Found
 from rebody.report.page.tables import PageTable, episodes_table, from_terminal
 from rebody.store.files import written_whole
@@ -56,6 +56,8 @@ def _environment() -> Environment:
         "summary": lambda results: from_terminal(summary_table([results]), ["", "value"]),
         "summaries": lambda compared: from_terminal(summary_table(list(compared.values())), ["", *compared]),
         "figures_of": figures_of,
+        "legend": legend,
+        "colours": COLOURS,
         "errors_of": errors_of,
         "episodes_of": episodes_table,
         "diagnoses": lambda compared: diagnoses_among(compared.values()),
