@@ -262,6 +262,18 @@ def test_a_module_that_stands_does_not_fit_a_robot_whose_tracker_cannot(full_mod
     refused(code, capsys, "no slot for stand")
 
 
+def test_a_diagnosis_and_own_artifacts_are_reported(trained, tasks, tmp_path, capsys):
+    out, page = tmp_path / "diagnosis", tmp_path / "page.html"
+    parts = ["--inference", str(trained["inference"]), "--tracker", str(trained["tracker"]), "--seconds", SECONDS]
+    assert run(["diagnose", "--tasks", str(tasks), *parts, "--out", str(out)]) == 0
+    assert sorted(path.name for path in out.iterdir()) == ["bayes.json", "oracle.json", "readout.json", "reuse.json"]
+    runs = [str(trained["inference"]), str(trained["tracker"]), str(out), str(out / "reuse.json")]
+    assert run(["report", *runs, "--out", str(page)]) == 0
+    assert f"written: {page}" in capsys.readouterr().out
+    for words in ("Learning curves", "return that it costs", "--updates 2", "clusters against base tasks"):
+        assert words in page.read_text(), words
+
+
 def test_the_same_command_writes_the_same_results(trained, evaluate):
     tracker = ["--robot", "cheetah", "--tracker", str(trained["tracker"])]
     assert evaluate(*tracker) == evaluate(*tracker)

@@ -94,6 +94,11 @@ class Results:
         """Episodes whose last task is of that family."""
         return [episode for episode in self.episodes if episode.active_family[-1] == family]
 
+    @property
+    def families(self) -> list[str]:
+        """Names of those that episodes end with."""
+        return sorted({episode.active_family[-1] for episode in self.episodes})
+
     @cached_property
     def summary(self) -> dict[str, Any]:
         """Statistics per family, with 95 % bootstrap intervals."""

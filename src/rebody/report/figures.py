@@ -16,18 +16,15 @@ FAMILY_COLOURS = (MOTION, BELIEF, IDLE)
 
 def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) -> None:
     """Trajectories and errors of each family, and what was believed, of three agents on the same tasks."""
-    families = sorted({episode.active_family[-1] for episode in results.episodes})
+    families = results.families
     columns = len(families) + 1
     with figure(path, 2, columns, size=(4.7 * columns, 7.4)) as (drawing, panels):
         for i, family in enumerate(families):
-            _trajectories(panels[i], results.of(family))
+            draw_trajectories(panels[i], results.of(family))
             agents = {"reuse": results, "oracle": oracle, "idle": idle}
             _errors(panels[columns + i], {name: of.of(family) for name, of in agents.items()}, family)
-        if len(families) > 1:
-            _kinds(panels[columns - 1], results, families)
-        else:
-            _latents(panels[columns - 1], results)
-        _readings(panels[-1], results, families)
+        draw_beliefs(panels[columns - 1], results)
+        draw_readings(panels[-1], results)
         drawing.suptitle(
             f"Inference module '{results.inference}', trained on a point mass, on the {results.robot}: "
             "the task is told to nobody but the oracle"
@@ -68,7 +65,8 @@ def draw_progress(axes: Axes, episode: EpisodeResult, family: str, until: int | 
     legend.set_in_layout(False)
 
 
-def _trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:
+def draw_trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:
+    """What the robot did in episodes of one family, each target a dot of its colour at the end."""
     largest, family = max(abs(e.active_target[-1]) for e in episodes) or 1.0, episodes[0].active_family[-1]
     for episode in episodes:
         colour = plt.get_cmap(TASKS)(0.5 + 0.5 * episode.active_target[-1] / largest)
@@ -77,9 +75,17 @@ def _trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:
     axes.set(xlabel="time [s]", ylabel=f"{family} [{_unit(family)}]", title=f"{family}: robot (lines), targets (dots)")
 
 
-def _kinds(axes: Axes, results: Results, families: list[str]) -> None:
+def draw_beliefs(axes: Axes, results: Results) -> None:
+    """The latents at the end."""
+    if len(results.families) > 1 and len(results.episodes[0].latent[0]) > 1:
+        _kinds(axes, results)
+    else:
+        _latents(axes, results)
+
+
+def _kinds(axes: Axes, results: Results) -> None:
     """Which of several families it is shows in the latent's first numbers."""
-    for family, colour in zip(families, FAMILY_COLOURS, strict=False):
+    for family, colour in zip(results.families, FAMILY_COLOURS, strict=False):
         final = np.array([episode.latent[-1] for episode in results.of(family)])
         axes.plot(final[:, 0], final[:, 1], ".", color=colour, label=family)
     axes.set(xlabel="latent 1", ylabel="latent 2", title="the belief at the end: what kind of task")
@@ -97,9 +103,9 @@ def _latents(axes: Axes, results: Results) -> None:
     axes.legend(frameon=False)
 
 
-def _readings(axes: Axes, results: Results, families: list[str]) -> None:
+def draw_readings(axes: Axes, results: Results) -> None:
     """What a linear probe reads from the last belief, over what is true."""
-    for family, colour in zip(families, FAMILY_COLOURS, strict=False):
+    for family, colour in zip(results.families, FAMILY_COLOURS, strict=False):
         of = results.of(family)
         truth = [episode.active_target[-1] for episode in of]
         read = [episode.inferred_target[-1] for episode in of]
