@@ -33,7 +33,8 @@ def from_terminal(table: Table, header: Sequence[str] | None = None) -> PageTabl
 def episodes_table(results: Results) -> PageTable:
     """A row per episode: the task, what was believed of it in the end, and how it went."""
     header = [
-        "hidden task", "seed", "read from the belief", "final error", "ripple [m/s]", "return", "oracle's return", "fell",
+        "hidden task", "seed", "read from the belief", "final error", "ripple [m/s]", "return", "oracle's return",
+        "fell",
     ]  # fmt: skip
     return PageTable("", header, [_row(episode) for episode in results.episodes])
 
