@@ -12,7 +12,9 @@ from rebody.evaluation.reading import holds_results
 @pytest.fixture
 def results(result):
     switched = result(switch={"at_s": 1.0, "family": "goal", "target": 3.0}, subgoal=[None] * 30, oracle_return=None)
-    return Results("cheetah", "reuse", "tiny", None, 0.05, "predicted", 15, True, {"module": "12ab"}, [result(), switched])
+    return Results(
+        "cheetah", "reuse", "tiny", None, 0.05, "predicted", 15, True, {"module": "12ab"}, [result(), switched]
+    )
 
 
 @pytest.fixture
@@ -65,4 +67,3 @@ def test_other_files_hold_no_results(content, path):
 def test_those_of_another_version_are_results_all_the_same(path):
     _spoil(path, lambda content: content.update(version=2))
     assert holds_results(path)
-

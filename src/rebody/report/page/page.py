@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
-from rebody.evaluation.diagnosis import Diagnosis, diagnoses_among, diagnosis_tables
+from rebody.evaluation.diagnosis import diagnoses_among, diagnosis_tables
 from rebody.evaluation.results import Results
 from rebody.evaluation.tables import summary_table
 from rebody.report.diagnosis import plot_diagnosis
@@ -20,7 +20,7 @@ from rebody.report.page.curves import learning_curves
 from rebody.report.page.drawing import COLOURS, inline
 from rebody.report.page.evaluations import errors_of, figures_of, legend, settings_of
 from rebody.report.page.find import Found
-from rebody.report.page.tables import PageTable, episodes_table, from_terminal
+from rebody.report.page.tables import episodes_table, from_terminal
 from rebody.store.files import written_whole
 from rebody.training.card import command_line, versions
 
