@@ -92,7 +92,7 @@ def test_every_episode_has_its_row(page, written):
     assert [len(table) for table in episodes] == [1 + 2] * 4
     reuse = episodes[sorted(LADDER).index("reuse")]
     assert [row[0] for row in reuse[1:]] == ["goal +2.5", "goal -1, from 1 s goal +1.5"]
-    assert [row[3] for row in reuse[1:]] == [f"{e.final_error:.3f}" for e in written.results["reuse"].episodes]
+    assert [row[3] for row in reuse[1:]] == [f"{e.final_error:.3f} m" for e in written.results["reuse"].episodes]
 
 
 def test_the_ladder_is_there_since_all_its_agents_are(page):
