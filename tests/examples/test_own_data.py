@@ -15,9 +15,10 @@ COMMANDS = re.findall(r"^    \.venv/bin/rebody (.*)$", PAGE, re.MULTILINE)
 
 
 @pytest.mark.parametrize(
-    ("block", "said"), zip(BLOCKS, (r"^goal 6\.\d+ ", r"^\(29,\) (goal|velocity)$"), strict=True),
+    ("block", "said"),
+    list(zip(BLOCKS, (r"^goal [56]\.\d+ ", r"^\(29,\) (goal|velocity)$"), strict=True)),
     ids=["live", "environment"],
-)  # fmt: skip
+)
 def test_python(block, said, capsys):
     """Twenty decisions say what is asked; after the one of the second block either family is a fair guess."""
     exec(block, {})
