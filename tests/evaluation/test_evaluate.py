@@ -14,7 +14,7 @@ from rebody.bodies import load_robot
 from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results
-from rebody.evaluation.evaluate import POINT_MASS
+from rebody.evaluation.evaluate import POINT_MASS, ROBOT_AGENTS
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import no_mixture
 from rebody.store import tree_hash
@@ -96,7 +96,7 @@ def on_the_toy(trial, **changes):
     return replace(trial, robot=None, tracker=None, flat=None, **changes)
 
 
-@pytest.mark.parametrize("agent", [kind for kind in AGENTS if kind != "flat"])
+@pytest.mark.parametrize("agent", [kind for kind in AGENTS if kind not in ROBOT_AGENTS])
 def test_point_mass(trial, agent):
     results = evaluate(on_the_toy(trial, agent=agent), SPECS, 1)
     assert (results.robot, results.agent, results.tracker, results.control_dt) == (POINT_MASS, agent, None, 0.1)
@@ -251,7 +251,7 @@ def test_a_step_predictor_that_does_not_fit_is_refused(trial, predicting):
     told = predicting(3)
     for change, said in (
         ({"robot": "walker"}, "'tiny-predictor' was trained on 'walker', not on 'cheetah'"),
-        ({"tracker_hash": "0" * 64}, "knows how fast another tracker than 'tiny-tracker' is"),
+        ({"tracker_hash": "0" * 64}, "was trained with another tracker than 'tiny-tracker'"),
     ):
         with pytest.raises(RebodyError, match=said):
             evaluate(replace(told, step_predictor=replace(told.step_predictor, **change)), SPECS, 1)
@@ -282,10 +282,10 @@ REFUSED = {
     "'tiny-flat' was trained on 'walker', not on 'cheetah'": lambda trial: (
         replace(trial, agent="flat", flat=replace(trial.flat, robot="walker")), SPECS,
     ),
-    "agent 'flat' moves the joints of a robot, and a point mass has none": lambda trial: (
+    "agent 'flat' learned on a robot, and a point mass is none": lambda trial: (
         replace(trial, agent="flat", robot=None), SPECS,
     ),
-    "thesis mode is for the agents reuse, readout, bayes, not for 'oracle'": lambda trial: (
+    "thesis mode is for the agents reuse, retrain, readout, bayes, not for 'oracle'": lambda trial: (
         replace(trial, agent="oracle", thesis=True), SPECS,
     ),
     "thesis mode is for the agents .*not for 'flat'": lambda trial: (

@@ -29,3 +29,11 @@ def test_the_log_is_what_its_script_makes(tmp_path):
     assert made[0] == shipped[0]
     assert [row[0] for row in made] == [row[0] for row in shipped[: len(made)]]
     assert len(shipped) == 402
+
+
+def test_driving():
+    *_, last = load("driving.py").drive((("goal", 2.0),), 4.0)
+    time, task, (family, target), x, _ = last
+    assert (time, task, family) == (pytest.approx(4.0), ("goal", 2.0), "goal")
+    assert target == pytest.approx(2.0, abs=0.2)
+    assert x == pytest.approx(2.0, abs=0.2)
