@@ -1,0 +1,48 @@
+"""Links that hold in the repository, made to hold on the site.
+
+    [changelog](../CHANGELOG.md)                                a page of the site
+    [`Encoder.step`](../src/rebody/inference/encoder.py)        the API reference of what is named
+    [`rebody.inference`](../src/rebody/inference)               that package's page
+    [believing.py](../examples/believing.py)                    alone on a line: the script itself
+"""
+
+import posixpath
+import re
+from pathlib import Path
+
+from reference import BESIDE, PACKAGES
+
+LINK = re.compile(r"\[(?P<text>[^\]]*)\]\((?P<path>[^)#:\s]+)(?P<anchor>#[^)\s]*)?\)")
+SCRIPT = re.compile(r"^\[[^\]]*\]\(\.\./(examples/\S+\.py)\)$", re.MULTILINE)
+
+
+def on_page_markdown(markdown, page, config, **_):
+    """Hook of MkDocs: rewrite a page's links; it lies where its source lies in the repository."""
+    source = next((path for path, uri in BESIDE.items() if uri == page.file.src_uri), f"docs/{page.file.src_uri}")
+    root = Path(config.config_file_path).parent
+    markdown = SCRIPT.sub(lambda script: _shown(root, script[1]), markdown)
+    return LINK.sub(lambda link: _on_site(link, posixpath.dirname(source)), markdown)
+
+
+def symbol(text: str, path: str) -> str:
+    """What a link to code names: its text, in the module of that path."""
+    module = path.removeprefix("src/").removesuffix(".py").replace("/", ".")
+    return f"{module}.{text.strip('`')}"
+
+
+def _on_site(link: re.Match, folder: str) -> str:
+    text, anchor = link["text"], link["anchor"] or ""
+    path = posixpath.normpath(posixpath.join(folder, link["path"]))
+    if path in BESIDE:
+        return f"[{text}]({BESIDE[path]}{anchor})"
+    if path in PACKAGES:
+        return f"[{text}]({PACKAGES[path]}{anchor})"
+    if path.startswith("src/"):
+        return f"[{text}][{symbol(text, path)}]"
+    if path.startswith("docs/"):
+        return f"[{text}]({path.removeprefix('docs/')}{anchor})"
+    return link[0]  # leads nowhere: MkDocs says so
+
+
+def _shown(root: Path, path: str) -> str:
+    return f'```python title="{path}"\n{(root / path).read_text()}```'
