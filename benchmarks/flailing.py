@@ -35,7 +35,10 @@ class Flailing(Controller):
     actor: Actor
     key: jax.Array
 
-    def __call__(self, joints, x, subgoal, belief):
+    def see(self, batch):
+        return batch.joint_state()
+
+    def __call__(self, joints, x, pitch, subgoal, belief):
         observation = flat_observation(joints, x, belief, 10.0)
         # a fresh draw at every control step, from what the robot feels
         key = jax.random.fold_in(self.key, (1e4 * joints[0, -1]).astype(np.int32))

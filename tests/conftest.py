@@ -36,6 +36,7 @@ from rebody.inference.contract import Contract  # noqa: E402
 from rebody.inference.probe import Probe  # noqa: E402
 from rebody.store import tree_hash  # noqa: E402
 from rebody.training.flat import report as flat_report  # noqa: E402
+from rebody.training.high_level import report as high_level_report  # noqa: E402
 from rebody.training.inference import measure as inference_measure  # noqa: E402
 from rebody.training.inference import report as inference_report  # noqa: E402
 from rebody.training.inference import train as inference_train  # noqa: E402
@@ -144,6 +145,10 @@ FLAGS = {
         train flat --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5
         --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
     """,
+    "high-level": """
+        train high-level --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5
+        --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
+    """,
     "step-predictor": """
         train step-predictor --robot cheetah --robots 4 --steps 20 --updates 2 --iterations 9 --replay 60
         --sac.hidden 8 8 --sac.batch-size 8
@@ -168,6 +173,8 @@ def in_short() -> Iterator[pytest.MonkeyPatch]:
         patched.setattr(inference_measure, "DECISIONS", 60)
         patched.setattr(flat_report, "TASKS", 3)
         patched.setattr(flat_report, "DECISIONS", 30)
+        patched.setattr(high_level_report, "TASKS", 3)
+        patched.setattr(high_level_report, "DECISIONS", 30)
         patched.setattr(step_report, "ROBOTS", 8)
         patched.setattr(step_report, "SECONDS", 2.0)
         yield patched
@@ -210,15 +217,16 @@ def full_module(tmp_path_factory) -> Path:
 def tiny_training(own_module, own_tracker) -> dict[str, list[str]]:
     """Command lines of tiny runs without --out, by the kind of artifact that they make."""
     arguments = {kind: flags.split() for kind, flags in FLAGS.items()}
-    parts = {"flat": ["--inference", str(own_module)], "step-predictor": ["--tracker", str(own_tracker)]}
+    hears, moves = ["--inference", str(own_module)], ["--tracker", str(own_tracker)]
+    parts = {"flat": hears, "high-level": [*hears, *moves], "step-predictor": moves}
     return {kind: [*words, *parts.get(kind, [])] for kind, words in arguments.items()}
 
 
 @pytest.fixture(scope="session")
 def trained(own_module, tiny_training) -> dict[str, Path]:
-    """Folders of a module, a tracker, a flat policy that hears that module, and that tracker's step predictor."""
+    """Folders of a module, a tracker, the policies that hear that module, and that tracker's step predictor."""
     folders = {kind: own_module.with_name(kind) for kind in tiny_training}
     with in_short():
-        for kind in ("flat", "step-predictor"):
+        for kind in ("flat", "high-level", "step-predictor"):
             assert run([*tiny_training[kind], "--out", str(folders[kind])]) == 0
     return folders

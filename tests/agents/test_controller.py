@@ -1,10 +1,13 @@
 """What moves the joints looks at what it needs, and at nothing else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rebody.agents.controller import FlatController, TrackerController
 from rebody.agents.rollout import joint_action
+from rebody.bodies import RobotBatch
 from rebody.control.tracker import Command
 from rebody.tasks import GOAL, VELOCITY
 from rebody.types import Belief, Subgoal
@@ -25,6 +28,15 @@ def following(tracker):
 @pytest.fixture(scope="module")
 def believing(flat_policy):
     return FlatController(flat_policy)
+
+
+def test_a_tracker_sees_the_pace_and_a_flat_policy_does_not(cheetah, following, believing):
+    batch = RobotBatch(replace(cheetah, smoothing_s=0.2), 2)
+    batch.push(np.array([1.0, -1.0]))
+    batch.step(np.zeros((2, 6)))
+    np.testing.assert_array_equal(following.see(batch)[:, :-1], believing.see(batch))
+    np.testing.assert_allclose(following.see(batch)[:, -1], batch.pace, rtol=1e-6)
+    assert np.abs(batch.pace).min() > 0.01
 
 
 def test_the_tracker_is_told_the_distance(tracker, following):

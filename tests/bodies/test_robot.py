@@ -114,9 +114,9 @@ def test_joint_state_does_not_know_where_it_is_nor_how_often_it_turned(cheetah):
     rng = np.random.default_rng(0)
     qpos, qvel = rng.normal(size=(2, 9)), rng.normal(size=(2, 9))
     moved = qpos + np.array([5.0, 0, 2 * np.pi, 0, 0, 0, 0, 0, 0])
-    seen, pace = cheetah.joint_state(qpos, qvel, np.zeros(2)), np.ones(2)
+    seen = cheetah.joint_state(qpos, qvel)
     assert seen.shape == (2, 17)
-    np.testing.assert_allclose(cheetah.joint_state(moved, qvel, pace), seen, atol=1e-5)
+    np.testing.assert_allclose(cheetah.joint_state(moved, qvel), seen, atol=1e-5)
 
 
 def test_pace_is_the_speed_of_a_control_step_or_its_mean_over_the_last_ones(cheetah, walker):
@@ -131,17 +131,19 @@ def test_pace_is_the_speed_of_a_control_step_or_its_mean_over_the_last_ones(chee
 
 
 def test_a_batch_knows_its_pace(walker):
-    """It comes last in the joint state, begins anew with a robot, and is restored with the state."""
+    """A tracker sees it last, it begins anew with a robot, and is restored with the state."""
     batch, twin = batch_of(walker, 3), batch_of(walker, 3)
     batch.push(np.array([1.0, 0.0, -1.0]))
     batch.step(np.zeros((3, 6)))
     assert (np.sign(batch.pace) == np.sign(batch.x)).all()
     np.testing.assert_allclose(batch.pace, batch.x / walker.smoothing_s)
-    np.testing.assert_array_equal(batch.joint_state()[:, -1], batch.pace.astype(np.float32))
+    seen = batch.tracker_state()
+    np.testing.assert_array_equal(seen[:, :-1], batch.joint_state())
+    np.testing.assert_array_equal(seen[:, -1], batch.pace.astype(np.float32))
     twin.state = batch.state
     for robots in (batch, twin):
         robots.step(np.ones((3, 6)))
-    np.testing.assert_array_equal(twin.joint_state(), batch.joint_state())
+    np.testing.assert_array_equal(twin.tracker_state(), batch.tracker_state())
     batch.reset(np.random.default_rng(0), np.array([True, False, False]))
     np.testing.assert_array_equal(batch.pace, [0.0, *twin.pace[1:]])
 

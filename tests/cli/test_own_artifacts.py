@@ -151,6 +151,28 @@ def test_what_is_read_is_handed_to_the_tracker(agent, trained, evaluate):
         assert set(episode["subgoal_family"]) == {"goal"}
 
 
+def test_an_own_high_level_policy_is_judged(trained, evaluate, tmp_path, capsys):
+    parts = ["--robot", "cheetah", "--tracker", str(trained["tracker"]), "--agent", "retrain"]
+    code, results = evaluate(*parts, "--high-level", str(trained["high-level"]))
+    assert code == 0
+    assert "cheetah, retrain" in capsys.readouterr().out
+    for episode in results["episodes"]:
+        asked = np.subtract(episode["subgoal"][1:], episode["position_m"][:-1])
+        assert (np.abs(asked) <= 5.0 + 1e-4).all()
+        assert len(np.unique(asked)) > 1
+
+    alone = ["--agent", "retrain", "--high-level", str(trained["high-level"])]
+    refused(evaluate(*alone, "--robot", "point-mass")[0], capsys, "a point mass is none")
+    refused(evaluate("--agent", "retrain", "--robot", "cheetah")[0], capsys, "high-level-inference-cheetah")
+    refused(evaluate(*alone, "--robot", "cheetah")[0], capsys, "trained with another tracker than 'tracker-cheetah'")
+    loaded = load_artifact(trained["high-level"], "high-level")
+    save_artifact(
+        tmp_path / "other", kind="high-level", config=loaded.config | {"inference_hash": "0" * 64},
+        weights=loaded.arrays, card=loaded.card, log=loaded.log,
+    )  # fmt: skip
+    refused(evaluate(*parts, "--high-level", str(tmp_path / "other"))[0], capsys, "another module than 'inference'")
+
+
 def test_an_own_flat_policy_is_judged(trained, evaluate, tmp_path, capsys):
     parts = ["--robot", "cheetah", "--tracker", str(trained["tracker"]), "--agent", "flat"]
     code, results = evaluate(*parts, "--flat", str(trained["flat"]))
@@ -238,6 +260,18 @@ def test_a_module_that_stands_does_not_fit_a_robot_whose_tracker_cannot(full_mod
     parts = ["--inference", str(full_module), "--robot", "hopper", "--agent", "readout"]
     code = run(["evaluate", "--tasks", str(tasks), *parts])
     refused(code, capsys, "no slot for stand")
+
+
+def test_a_diagnosis_and_own_artifacts_are_reported(trained, tasks, tmp_path, capsys):
+    out, page = tmp_path / "diagnosis", tmp_path / "page.html"
+    parts = ["--inference", str(trained["inference"]), "--tracker", str(trained["tracker"]), "--seconds", SECONDS]
+    assert run(["diagnose", "--tasks", str(tasks), *parts, "--out", str(out)]) == 0
+    assert sorted(path.name for path in out.iterdir()) == ["bayes.json", "oracle.json", "readout.json", "reuse.json"]
+    runs = [str(trained["inference"]), str(trained["tracker"]), str(out), str(out / "reuse.json")]
+    assert run(["report", *runs, "--out", str(page)]) == 0
+    assert f"written: {page}" in capsys.readouterr().out
+    for words in ("Learning curves", "return that it costs", "--updates 2", "clusters against base tasks"):
+        assert words in page.read_text(), words
 
 
 def test_the_same_command_writes_the_same_results(trained, evaluate):

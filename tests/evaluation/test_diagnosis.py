@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from rebody.evaluation.diagnosis import LADDER, Diagnosis, diagnose, diagnosis_tables, shares_of
+from rebody.evaluation.diagnosis import LADDER, Diagnosis, diagnose, diagnoses_among, diagnosis_tables, shares_of
 from rebody.evaluation.results import EpisodeResult, Results
 from rebody.report.diagnosis import plot_diagnosis
 from rebody.tasks.task_file import TaskSpec
@@ -98,3 +98,32 @@ def test_every_agent_does_the_same_tasks(trial, tmp_path):
     assert f"{diagnosis.results['bayes'].summary['families']['goal']['median_error']['value']:.3f}" in text
     plot_diagnosis(diagnosis, tmp_path / "d.png")
     assert (tmp_path / "d.png").stat().st_size > 10_000
+
+
+def test_evaluations_that_are_there_are_a_diagnosis():
+    ladder = [results_of(episode_of(), agent=agent) for agent in ("flat", *reversed(LADDER))]
+    elsewhere = replace(results_of(episode_of()), robot="walker")
+    whole, half = diagnoses_among([*ladder, elsewhere])
+    assert whole.is_complete
+    assert set(whole.results) == set(LADDER)
+    assert half.results == {"reuse": elsewhere}
+    assert not half.is_complete
+    assert [len(diagnosis_tables(diagnosis)) for diagnosis in (whole, half)] == [3, 2]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        results_of(episode_of(target=5.0), agent="oracle"),
+        replace(results_of(episode_of(), agent="oracle"), tracker="another"),
+        replace(results_of(episode_of(), agent="oracle"), frozen={"module": "another"}),
+    ],
+)
+def test_evaluations_under_other_conditions_are_not_compared(other):
+    (diagnosis,) = diagnoses_among([other, results_of(episode_of())])
+    assert set(diagnosis.results) == {"reuse"}
+
+
+def test_there_is_no_diagnosis_of_a_point_mass_or_of_thesis_mode():
+    results = results_of(episode_of())
+    assert not diagnoses_among([replace(results, robot="point-mass"), replace(results, thesis=True)])

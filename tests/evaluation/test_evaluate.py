@@ -14,7 +14,7 @@ from rebody.bodies import load_robot
 from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results
-from rebody.evaluation.evaluate import POINT_MASS
+from rebody.evaluation.evaluate import POINT_MASS, ROBOT_AGENTS
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import no_mixture
 from rebody.store import tree_hash
@@ -96,7 +96,7 @@ def on_the_toy(trial, **changes):
     return replace(trial, robot=None, tracker=None, flat=None, **changes)
 
 
-@pytest.mark.parametrize("agent", [kind for kind in AGENTS if kind != "flat"])
+@pytest.mark.parametrize("agent", [kind for kind in AGENTS if kind not in ROBOT_AGENTS])
 def test_point_mass(trial, agent):
     results = evaluate(on_the_toy(trial, agent=agent), SPECS, 1)
     assert (results.robot, results.agent, results.tracker, results.control_dt) == (POINT_MASS, agent, None, 0.1)
@@ -282,7 +282,7 @@ REFUSED = {
     "'tiny-flat' was trained on 'walker', not on 'cheetah'": lambda trial: (
         replace(trial, agent="flat", flat=replace(trial.flat, robot="walker")), SPECS,
     ),
-    "agent 'flat' moves the joints of a robot, and a point mass has none": lambda trial: (
+    "agent 'flat' learned on a robot, and a point mass is none": lambda trial: (
         replace(trial, agent="flat", robot=None), SPECS,
     ),
     "thesis mode is for the agents reuse, readout, bayes, not for 'oracle'": lambda trial: (

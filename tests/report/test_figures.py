@@ -9,6 +9,7 @@ from PIL import Image
 
 from rebody.evaluation.results import EpisodeResult, Results
 from rebody.report import plot_episode, plot_transfer
+from rebody.report.figures import draw_progress
 from rebody.report.style import figure
 
 TIME = 30
@@ -63,16 +64,42 @@ def test_episode(family, tmp_path):
     assert_drawn(tmp_path / "episode.png")
 
 
-def test_episode_with_a_switch(tmp_path):
-    half = TIME // 2
-    switched = replace(
+@pytest.fixture
+def switched():
+    """A goal of 2 m that becomes a speed of -1 m/s in the middle, noticed three decisions later."""
+    half, later = TIME // 2, TIME // 2 + 3
+    return replace(
         episode_of(2.0),
         switch={"at_s": 1.5, "family": "velocity", "target": -1.0},
         active_family=["goal"] * half + ["velocity"] * half,
         active_target=[2.0] * half + [-1.0] * half,
+        inferred_family=["goal"] * later + ["velocity"] * (TIME - later),
+        inferred_target=[1.9] * later + [-0.9] * (TIME - later),
     )
+
+
+def test_episode_with_a_switch(switched, tmp_path):
     plot_episode(switched, tmp_path / "episode.png")
     assert_drawn(tmp_path / "episode.png")
+
+
+@pytest.mark.parametrize(
+    ("family", "wanted", "read", "first", "last"),
+    [("goal", 2.0, 1.9, (0, 0), (14, 17)), ("velocity", -1.0, -0.9, (15, 18), (29, 19))],
+)
+def test_each_family_is_drawn_by_itself_while_it_counts(switched, family, wanted, read, first, last):
+    """Until the 20th decision."""
+    drawing, axes = plt.subplots()
+    draw_progress(axes, switched, family, 20)
+    lines = dict(zip(("wanted", "read", "robot"), (line.get_ydata() for line in axes.lines), strict=True))
+    plt.close(drawing)
+    assert switched.families == ["goal", "velocity"]
+    for name, value, begin, end in (("wanted", wanted, first[0], last[0]), ("read", read, first[1], last[1])):
+        shown = np.flatnonzero(np.isfinite(lines[name]))
+        np.testing.assert_array_equal(lines[name][shown], value)
+        assert (shown[0], shown[-1]) == (begin, end)
+    robot = switched.position_m if family == "goal" else switched.velocity_m_s
+    np.testing.assert_allclose(lines["robot"], robot[:20])
 
 
 def test_a_figure_that_fails_leaves_neither_file_nor_memory(tmp_path):

@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from rebody.agents.slots import SlotChooser
 from rebody.bodies.toys import Toy
 from rebody.control.high_level import HighLevelPolicy, TaskCode
+from rebody.control.slot_policy import SlotPolicy
 from rebody.tasks import GOAL, VELOCITY, achieved
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task, Transition
 
@@ -154,6 +155,19 @@ class ReadoutAgent(ToldAgent):
     def task(self, belief: Belief, decision: Int[AnyArray, ""]) -> Task:
         """What the belief speaks of."""
         return Task(*self.reader(belief))
+
+
+class RetrainAgent(Agent):
+    """A high-level policy that was learned on the robot makes subgoals of beliefs (thesis 5.6.2, 6.5)."""
+
+    interpret: Callable[[Belief], Belief]
+    """What the policy sees of a belief."""
+    policy: SlotPolicy
+
+    def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
+        """For a robot alone: the action for a toy is not a number."""
+        subgoal = self.policy(state, self.interpret(belief))
+        return Command(jnp.full((*state.x.shape, 1), jnp.nan), subgoal)
 
 
 class FlatAgent(Agent):

@@ -4,10 +4,18 @@ from typing import Literal
 
 import jax.numpy as jnp
 
-from rebody.agents.agent import Agent, FlatAgent, IdleAgent, OracleAgent, ReadoutAgent, ReuseAgent
-from rebody.agents.parts import Inference, LoadedFlat, LoadedSlots, LoadedStepPredictor, LoadedTracker
+from rebody.agents.agent import Agent, FlatAgent, IdleAgent, OracleAgent, ReadoutAgent, RetrainAgent, ReuseAgent
+from rebody.agents.parts import (
+    Inference,
+    LoadedFlat,
+    LoadedHighLevel,
+    LoadedSlots,
+    LoadedStepPredictor,
+    LoadedTracker,
+)
 from rebody.agents.slots import OneSlot, SlotChooser, SlotOfCluster
 from rebody.bodies import RobotSpec
+from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import SLOTS
 from rebody.errors import RebodyError
 from rebody.inference.exact import exact_posterior, read_mode
@@ -19,6 +27,7 @@ HORIZON = 15
 """Decisions that `reuse` looks ahead; 1 is the thesis."""
 AGENTS = {
     "reuse": "the frozen module and the frozen policy of the toy",
+    "retrain": "the frozen module, and a high-level policy that was learned on the robot",
     "readout": "the target read linearly from the module's belief, handed to the tracker",
     "bayes": "the exact posterior in place of the module, its most probable target handed to the tracker",
     "oracle": "told the task",
@@ -36,18 +45,19 @@ def check_agent(kind: str) -> None:
         raise RebodyError(f"unknown agent '{kind}'. Agents are: {', '.join(AGENTS)}.")
 
 
-def check_robot_of(part: LoadedTracker | LoadedFlat | LoadedStepPredictor, spec: RobotSpec) -> None:
+def check_robot_of(part: LoadedTracker | LoadedFlat | LoadedHighLevel | LoadedStepPredictor, spec: RobotSpec) -> None:
     """RebodyError if a policy was trained on another robot, or on another description of it."""
     if part.robot != spec.name:
         raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{spec.name}'.")
-    if isinstance(part, LoadedTracker) and part.tracker.joints != spec.joints:
+    if isinstance(part, LoadedTracker) and part.tracker.joints != spec.tracker_inputs:
         raise RebodyError(
             f"'{part.name}' was trained on another description of '{spec.name}': it sees {part.tracker.joints} numbers "
-            f"of the body, which now gives {spec.joints}. Train it anew (rebody train tracker --robot {spec.name})."
+            f"of the body, which now gives {spec.tracker_inputs}. "
+            f"Train it anew (rebody train tracker --robot {spec.name})."
         )
 
 
-def check_module_of(what: str, part: LoadedFlat | LoadedSlots, inference: Inference) -> None:
+def check_module_of(what: str, part: LoadedFlat | LoadedHighLevel | LoadedSlots, inference: Inference) -> None:
     """RebodyError if a part, called `what`, was trained on the beliefs of another module."""
     if part.inference_hash != tree_hash(inference.parts.module):
         raise RebodyError(
@@ -56,13 +66,18 @@ def check_module_of(what: str, part: LoadedFlat | LoadedSlots, inference: Infere
         )
 
 
-def check_step_predictor(part: LoadedStepPredictor, tracker: LoadedTracker, inference: Inference) -> None:
-    """RebodyError if a step predictor knows another tracker, or not all that the module's subgoals may be about."""
+def check_tracker_of(what: str, part: LoadedHighLevel | LoadedStepPredictor, tracker: LoadedTracker) -> None:
+    """RebodyError if a part, called `what`, was trained with another tracker."""
     if part.tracker_hash != tree_hash(tracker.tracker):
         raise RebodyError(
-            f"step predictor '{part.name}' knows how fast another tracker than '{tracker.name}' is. "
-            "Use that one (its card names it), or train it anew (rebody train step-predictor)."
+            f"{what} '{part.name}' was trained with another tracker than '{tracker.name}'. "
+            "Use that one (its card names it), or train it anew."
         )
+
+
+def check_step_predictor(part: LoadedStepPredictor, tracker: LoadedTracker, inference: Inference) -> None:
+    """RebodyError if a step predictor knows another tracker, or not all that the module's subgoals may be about."""
+    check_tracker_of("step predictor", part, tracker)
     unknown = [FAMILIES[family].name for family in inference.contract.families if family not in SLOTS]
     if unknown:
         raise RebodyError(
@@ -98,11 +113,12 @@ def build_agent(
     tasks: Task | None = None,
     *,
     slots: SlotChooser | None = None,
+    high_level: SlotPolicy | None = None,
     stride: int = 1,
     horizon: int = HORIZON,
 ) -> Agent:
-    """An agent of a named kind; `oracle` needs the tasks, the active ones [time, episode], and `reuse` on a robot
-    what chooses its slots (a point mass has none: the module's first family stands for all).
+    """An agent of a named kind; `oracle` needs the tasks, the active ones [time, episode], `retrain` its policy, and
+    `reuse` on a robot what chooses its slots (a point mass has none: the module's first family stands for all).
 
     RebodyError if there is no such kind, or the module cannot serve it.
     """
@@ -115,6 +131,9 @@ def build_agent(
             acts = {"interpret": parts.module.decoder.interpret, "high_level": parts.high_level}
             slots = slots or OneSlot(contract.families[0])
             return ReuseAgent(**listens, **acts, toy=inference.toy, horizon=horizon, slots=slots)
+        case "retrain":
+            assert high_level is not None
+            return RetrainAgent(**listens, interpret=parts.module.decoder.interpret, policy=high_level)
         case "readout":
             return ReadoutAgent(**listens, **told)
         case "bayes":

@@ -66,7 +66,7 @@ class PredictedClock(Clock):
 
     def steps(self, batch, subgoal):
         """What the predictor says."""
-        return np.asarray(_predict(self.predictor, batch.joint_state(), *place(batch), subgoal))
+        return np.asarray(_predict(self.predictor, batch.tracker_state(), *place(batch), subgoal))
 
 
 def place(batch: RobotBatch) -> tuple[Float[np.ndarray, " robot"], Float[np.ndarray, " robot"]]:

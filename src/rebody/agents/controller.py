@@ -5,8 +5,10 @@ from abc import abstractmethod
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
+from rebody.bodies import RobotBatch
 from rebody.control.flat import FlatPolicy
 from rebody.control.tracker import Command, Tracker, relative
 from rebody.tasks import GOAL
@@ -14,7 +16,11 @@ from rebody.types import AnyArray, Belief, Subgoal
 
 
 class Controller(eqx.Module):
-    """(joint state, x, pitch, subgoal, belief) -> joint action; each kind looks at what it needs."""
+    """(what it sees of the body, x, pitch, subgoal, belief) -> joint action; each kind looks at what it needs."""
+
+    @abstractmethod
+    def see(self, batch: RobotBatch) -> Float[np.ndarray, "robot joint"]:
+        """What it sees of each robot's body."""
 
     @abstractmethod
     def __call__(
@@ -35,6 +41,10 @@ class TrackerController(Controller):
     goal_ahead: float = eqx.field(static=True, default=math.inf)
     """Farthest that a goal is shown ahead [m], see `RobotSpec.goal_ahead`."""
 
+    def see(self, batch):
+        """The joint state, and the pace where there is one."""
+        return batch.tracker_state()
+
     def __call__(self, joints, x, pitch, subgoal, belief):
         """A goal is made relative to where the robot is now."""
         command = relative(subgoal, x, pitch)
@@ -46,6 +56,10 @@ class FlatController(Controller):
     """Follows the belief itself (thesis 6.3.2)."""
 
     policy: FlatPolicy
+
+    def see(self, batch):
+        """The joint state."""
+        return batch.joint_state()
 
     def __call__(self, joints, x, pitch, subgoal, belief):
         """There is no subgoal."""

@@ -61,7 +61,7 @@ class LiveAgent:
         if self._steps % self._spec.steps_per_decision == 0:
             self._decide(qpos, reward)
         self._steps, self._last_x = self._steps + 1, x
-        pitch, joints = self._spec.pitch(qpos), self._spec.joint_state(qpos, qvel, self._pace)
+        pitch, joints = self._spec.pitch(qpos), self._spec.tracker_state(qpos, qvel, self._pace)
         x, pitch = np.asarray(x, np.float32), np.asarray(pitch, np.float32)
         return np.asarray(joint_action(self._controller, joints, x, pitch, self._command.subgoal, self._carry.belief))
 

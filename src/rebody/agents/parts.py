@@ -18,6 +18,7 @@ from rebody.bodies.toys import Toy, make_toy
 from rebody.control.flat import FlatPolicy
 from rebody.control.high_level import HighLevelPolicy, PolicyView, TaskCode
 from rebody.control.sac import Actor, SACConfig
+from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import StepPredictor
 from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
@@ -86,6 +87,19 @@ class LoadedFlat:
 
 
 @dataclass(frozen=True)
+class LoadedHighLevel:
+    """A loaded high-level policy of a robot; it understands the beliefs of one module, and commands one tracker."""
+
+    name: str
+    robot: str
+    inference_hash: str
+    """Of the module's weights."""
+    tracker_hash: str
+    """Of the tracker's weights."""
+    policy: SlotPolicy
+
+
+@dataclass(frozen=True)
 class LoadedStepPredictor:
     """A loaded step predictor; it knows how fast one tracker is."""
 
@@ -141,6 +155,14 @@ def flat_template(config: dict[str, Any]) -> FlatPolicy:
     return FlatPolicy(_actor_template(config["observations"], config["actions"], config), config["reach"])
 
 
+def slot_policy_template(config: dict[str, Any]) -> SlotPolicy:
+    """A high-level policy of a robot of the right shapes, to be filled with weights."""
+    seen = config["view"]
+    view = PolicyView(tuple(seen["fields"]), tuple(seen["scales"]), tuple(map(tuple, seen["places"])))
+    slots = tuple((family_index(name), scale) for name, scale in config["slots"].items())
+    return SlotPolicy(_actor_template(config["observations"], len(slots), config), view, slots)
+
+
 def step_predictor_template(config: dict[str, Any]) -> StepPredictor:
     """A step predictor of the right shapes, to be filled with weights."""
     return StepPredictor(_actor_template(config["observations"], 1, config), Reach(**with_tuples(config["reach"])))
@@ -175,6 +197,14 @@ def load_flat(reference: str) -> LoadedFlat:
     with _understood(artifact):
         config = artifact.config
         return LoadedFlat(artifact.name, config["robot"], config["inference_hash"], _fill(flat_template, artifact))
+
+
+def load_high_level(reference: str) -> LoadedHighLevel:
+    """A shipped high-level policy of a robot by name, or one in a folder; RebodyError if it cannot be read."""
+    artifact = load_artifact(reference, "high-level")
+    with _understood(artifact):
+        config, policy = artifact.config, _fill(slot_policy_template, artifact)
+        return LoadedHighLevel(artifact.name, config["robot"], config["inference_hash"], config["tracker_hash"], policy)
 
 
 def load_step_predictor(reference: str) -> LoadedStepPredictor:

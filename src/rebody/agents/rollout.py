@@ -104,7 +104,7 @@ def rollout_on_robot(
 
 def follow(controller: Controller, batch: RobotBatch, subgoal: Subgoal, belief: Belief | None = None) -> None:
     """One control step of every robot."""
-    batch.step(np.asarray(joint_action(controller, batch.joint_state(), *place(batch), subgoal, belief)))
+    batch.step(np.asarray(joint_action(controller, controller.see(batch), *place(batch), subgoal, belief)))
 
 
 @eqx.filter_jit

@@ -153,8 +153,8 @@ class RobotSpec:
         )  # fmt: skip
 
     @property
-    def joints(self) -> int:
-        """Size of the joint state."""
+    def tracker_inputs(self) -> int:
+        """How many numbers a tracker sees of the body."""
         return self.model.nq - 1 + self.model.nv + (self.smoothing_s > 0)
 
     def next_pace(self, pace: Floats, moved: Floats) -> Floats:
@@ -162,19 +162,20 @@ class RobotSpec:
         share = min(1.0, self.control_dt / self.smoothing_s) if self.smoothing_s else 1.0
         return np.asarray(pace + share * (moved / self.control_dt - pace))
 
-    def joint_state(self, qpos: Floats, qvel: Floats, pace: Floats) -> Float[np.ndarray, "... joint"]:
-        """What a tracker sees of the body: positions without x, pitch wrapped, velocities of like size.
-
-        The pace comes last where it is more than the speed that stands among the velocities.
-        """
+    def joint_state(self, qpos: Floats, qvel: Floats) -> Float[np.ndarray, "... joint"]:
+        """Positions without x, pitch wrapped, then velocities of like size."""
         x, _, pitch = self.root_addresses
         positions = qpos.astype(np.float32)
         positions[..., pitch] = wrap_angle(positions[..., pitch])
         velocities = (qvel * self._velocity_scale).astype(np.float32)
-        seen = [np.delete(positions, x, axis=-1), velocities]
-        if self.smoothing_s:
-            seen.append(np.asarray(pace, np.float32)[..., None])
-        return np.concatenate(seen, axis=-1)
+        return np.concatenate([np.delete(positions, x, axis=-1), velocities], axis=-1)
+
+    def tracker_state(self, qpos: Floats, qvel: Floats, pace: Floats) -> Float[np.ndarray, "... joint"]:
+        """What a tracker sees of the body: the joint state, and the pace where that is more than a step's speed."""
+        joints = self.joint_state(qpos, qvel)
+        if not self.smoothing_s:
+            return joints
+        return np.concatenate([joints, np.asarray(pace, np.float32)[..., None]], axis=-1)
 
     @cached_property
     def _velocity_scale(self) -> Floats:
@@ -278,8 +279,12 @@ class RobotBatch:
         self.qvel[:, self.spec.x_velocity_address] += change
 
     def joint_state(self) -> Float[np.ndarray, "robot joint"]:
+        """Joint state of each robot."""
+        return self.spec.joint_state(self.qpos, self.qvel)
+
+    def tracker_state(self) -> Float[np.ndarray, "robot joint"]:
         """What a tracker sees of each robot."""
-        return self.spec.joint_state(self.qpos, self.qvel, self.pace)
+        return self.spec.tracker_state(self.qpos, self.qvel, self.pace)
 
     @property
     def state(self) -> Float[np.ndarray, "robot state"]:

@@ -10,6 +10,7 @@ from rich.console import Console
 from rebody.cli.output import PICTURES, check_output
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
+from rebody.evaluation import save_results
 from rebody.evaluation.diagnosis import LADDER, diagnose, diagnosis_tables
 from rebody.report.diagnosis import plot_diagnosis
 from rebody.tasks.task_file import read_tasks
@@ -25,6 +26,8 @@ class Diagnose:
     """Every task once per evaluation seed 0 to N-1."""
     figure: Path | None = None
     """Where a PNG goes."""
+    out: Path | None = None
+    """Folder for the JSON of each agent, which `rebody report` reads."""
     trial: Annotated[TrialOptions, tyro.conf.arg(name="")] = field(default_factory=TrialOptions)
 
     def run(self) -> None:
@@ -34,11 +37,16 @@ class Diagnose:
         if self.trial.agent != "reuse" or self.trial.thesis:
             raise RebodyError("a diagnosis is of `reuse` in its own time: leave --agent and --thesis out.")
         check_output(self.figure, "--figure", PICTURES)
+        if self.out is not None:
+            check_output(self.out / "reuse.json", "--out")
         specs, trial, console = read_tasks(self.tasks), self.trial.load(), Console()
         with console.status("") as status:
             diagnosis = diagnose(trial, specs, self.seeds, lambda agent: status.update(_doing(agent)))
         for table in diagnosis_tables(diagnosis):
             console.print(table)
+        if self.out is not None:
+            for agent, results in diagnosis.results.items():
+                save_results(results, self.out / f"{agent}.json")
         if self.figure is not None:
             plot_diagnosis(diagnosis, self.figure)
 

@@ -46,6 +46,7 @@ def parse(arguments: list[str]) -> Any:
     from rebody.cli.figure import Figures
     from rebody.cli.infer import Infer
     from rebody.cli.listing import List
+    from rebody.cli.report import Report
     from rebody.cli.robot import Robot
     from rebody.cli.run import RunTask
     from rebody.cli.stress import Stress
@@ -60,6 +61,7 @@ def parse(arguments: list[str]) -> Any:
         | Annotated[Infer, tyro.conf.subcommand("infer")]
         | train
         | Annotated[Figures, tyro.conf.subcommand("figure")]
+        | Annotated[Report, tyro.conf.subcommand("report")]
         | Annotated[Robot, tyro.conf.subcommand("robot")]
         | Annotated[Stress, tyro.conf.subcommand("stress")]
         | Annotated[List, tyro.conf.subcommand("list")]

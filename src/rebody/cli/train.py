@@ -11,6 +11,7 @@ from rebody.bodies import load_robot
 from rebody.errors import RebodyError
 from rebody.training.classifier import ClassifierConfig, train_classifier
 from rebody.training.flat import FlatConfig, train_flat
+from rebody.training.high_level import HighLevelConfig, train_high_level
 from rebody.training.inference import PRESETS, MetaConfig, train_inference
 from rebody.training.step_predictor import StepPredictorConfig, train_step_predictor
 from rebody.training.tracker import TrackerConfig, tracker_preset, train_tracker
@@ -95,6 +96,35 @@ class TrainFlat:
 
 
 @dataclass(frozen=True)
+class TrainHighLevel:
+    """Train a high-level policy on a robot, above its frozen tracker, on a frozen module's beliefs (thesis 6.5)."""
+
+    robot: str
+    """A robot's name (see `rebody list`), or the path of its TOML file."""
+    out: Path
+    """Folder of the run, and of the artifact that it becomes."""
+    inference: str = "goal-velocity"
+    """Inference artifact: a shipped name or a folder."""
+    tracker: str | None = None
+    """Tracker artifact; default tracker-ROBOT."""
+    seed: int = 0
+    """Seed of everything that is random."""
+    resume: bool = False
+    """Go on with the run in --out."""
+    init_from: str | None = None
+    """Start from the network of this high-level artifact."""
+    config: Annotated[HighLevelConfig, tyro.conf.arg(name="")] = field(default_factory=HighLevelConfig)
+
+    def run(self) -> None:
+        """Train, save, say where."""
+        folder = train_high_level(
+            self.robot, self.inference, self.tracker, self.config, self.out, self.seed,
+            resume=self.resume, init_from=self.init_from,
+        )  # fmt: skip
+        _show_card(folder)
+
+
+@dataclass(frozen=True)
 class TrainStepPredictor:
     """Train what says how many control steps a subgoal will take a robot and its frozen tracker (thesis 6.4.3)."""
 
@@ -157,8 +187,9 @@ def train_command(arguments: list[str]) -> type:
     tracker: Any = Annotated[TrainTracker, tyro.conf.subcommand("tracker", default=on_robot, prefix_name=False)]
     classifier: Any = Annotated[TrainClassifier, tyro.conf.subcommand("classifier", prefix_name=False)]
     flat: Any = Annotated[TrainFlat, tyro.conf.subcommand("flat", prefix_name=False)]
+    high_level: Any = Annotated[TrainHighLevel, tyro.conf.subcommand("high-level", prefix_name=False)]
     step_predictor: Any = Annotated[TrainStepPredictor, tyro.conf.subcommand("step-predictor", prefix_name=False)]
-    parts = inference | tracker | classifier | flat | step_predictor
+    parts = inference | tracker | classifier | high_level | flat | step_predictor
     command: Any = Annotated[parts, tyro.conf.arg(name="")]
     doc = "Train a part; every shipped artifact is made by these commands."
     return make_dataclass("Train", [("command", command)], frozen=True, namespace={"run": _run, "__doc__": doc})

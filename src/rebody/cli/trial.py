@@ -2,14 +2,17 @@
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
 from rebody.agents.build import AGENTS, HORIZON, SlotsBy, check_agent
 from rebody.agents.parts import (
+    LoadedHighLevel,
     LoadedStepPredictor,
     load_flat,
+    load_high_level,
     load_inference,
     load_slots_of,
     load_step_predictor,
@@ -35,6 +38,8 @@ class TrialOptions:
     """Tracker artifact; default tracker-ROBOT."""
     flat: str | None = None
     """Policy of agent `flat`; default flat-ROBOT."""
+    high_level: str | None = None
+    """Policy of agent `retrain`; default high-level-INFERENCE-ROBOT."""
     classifier: str | None = None
     """What chooses the slots of `reuse`; default classifier-INFERENCE where a module knows several families."""
     slots_by: SlotsBy = "classifier"
@@ -68,6 +73,7 @@ class TrialOptions:
             inference=inference,
             tracker=load_tracker(self.tracker or f"tracker-{robot.name}") if robot else None,
             flat=load_flat(self.flat or f"flat-{robot.name}") if robot and self.agent == "flat" else None,
+            high_level=self._high_level(robot),
             slots=load_slots_of(inference, self.classifier) if bridged else None,
             slots_by=self.slots_by,
             seconds=self.seconds,
@@ -86,6 +92,11 @@ class TrialOptions:
         if self.robot == POINT_MASS:
             raise RebodyError("--stride predicted counts control steps of a robot; a point mass has none.")
         return 1
+
+    def _high_level(self, robot: RobotSpec | None) -> LoadedHighLevel | None:
+        if robot is None or self.agent != "retrain":
+            return None
+        return load_high_level(self.high_level or f"high-level-{Path(self.inference).name}-{robot.name}")
 
     def _step_predictor(self, robot: RobotSpec | None) -> LoadedStepPredictor | None:
         if robot is None or self.stride != "predicted":

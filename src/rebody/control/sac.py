@@ -131,6 +131,10 @@ class Critics(eqx.Module):
         return jnp.stack([self.first(x)[..., 0], self.second(x)[..., 0]])
 
 
+Judge = Callable[[Critics, Float[AnyArray, "*batch observation"], Float[AnyArray, "*batch action"]], AnyArray]
+"""What an actor's action is worth to each critic, [2, *batch]; by itself that is what the critic says."""
+
+
 class SACState(eqx.Module):
     """Everything an update reads and writes."""
 
@@ -164,12 +168,15 @@ def initial_state(observations: int, actions: int, config: SACConfig, key: PRNGK
 
 
 def update(
-    state: SACState, batch: SACBatch, key: PRNGKeyArray, config: SACConfig
+    state: SACState, batch: SACBatch, key: PRNGKeyArray, config: SACConfig, judge: Judge = Critics.__call__
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
-    """One step of critics, actor and temperature, then of the two moving averages."""
+    """One step of critics, actor and temperature, then of the two moving averages.
+
+    With a `judge` an actor may say more than what is done in the end, which is what `batch.action` holds.
+    """
     critic_key, actor_key = jax.random.split(key)
-    state, critic_metrics = _update_critics(state, batch, critic_key, config)
-    state, actor_metrics = _update_actor(state, batch, actor_key, config)
+    state, critic_metrics = _update_critics(state, batch, critic_key, config, judge)
+    state, actor_metrics = _update_actor(state, batch, actor_key, config, judge)
     state, temperature_metrics = _update_temperature(state, actor_metrics["entropy"], batch, config)
     state = _update_averages(state, config)
     return state, critic_metrics | actor_metrics | temperature_metrics
@@ -181,6 +188,7 @@ def update_many(
     inputs: Any,
     keys: Key[AnyArray, " update"],
     config: SACConfig,
+    judge: Judge = Critics.__call__,
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """An update per key in one scan; `batch_of` makes its batch from one entry of `inputs` and a key.
 
@@ -191,7 +199,7 @@ def update_many(
     def step(arrays, inputs):
         inputs, key = inputs
         batch_key, update_key = jax.random.split(key)
-        updated, metrics = update(eqx.combine(arrays, static), batch_of(inputs, batch_key), update_key, config)
+        updated, metrics = update(eqx.combine(arrays, static), batch_of(inputs, batch_key), update_key, config, judge)
         return eqx.filter(updated, eqx.is_array), metrics
 
     arrays, metrics = jax.lax.scan(step, arrays, (inputs, keys))
@@ -205,10 +213,10 @@ def take_over(state: SACState, actor: Actor, name: str) -> SACState:
     return eqx.tree_at(lambda s: (s.actor, s.averaged_actor), state, (actor, actor))
 
 
-def _update_critics(state, batch, key, config):
+def _update_critics(state, batch, key, config, judge):
     """Soft Bellman error against the smaller of the two target critics (thesis 2.14, 2.15)."""
     next_action, next_log_prob = state.actor.sample(batch.next_observation, key)
-    next_value = state.target_critics(batch.next_observation, next_action).min(0)
+    next_value = judge(state.target_critics, batch.next_observation, next_action).min(0)
     next_value = next_value - jnp.exp(state.log_temperature) * next_log_prob
     target = batch.reward + config.discount * (1 - batch.terminal) * next_value
 
@@ -222,12 +230,12 @@ def _update_critics(state, batch, key, config):
     return state, {"critic_loss": value, "value": values.mean()}
 
 
-def _update_actor(state, batch, key, config):
+def _update_actor(state, batch, key, config, judge):
     """KL between the policy and the softmax of the critics (thesis 2.16, 2.17)."""
 
     def loss(actor):
         action, log_prob = actor.sample(batch.observation, key)
-        value = state.critics(batch.observation, action).min(0)
+        value = judge(state.critics, batch.observation, action).min(0)
         return jnp.mean(jnp.exp(state.log_temperature) * log_prob - value), -log_prob.mean()
 
     (value, entropy), gradient = eqx.filter_value_and_grad(loss, has_aux=True)(state.actor)

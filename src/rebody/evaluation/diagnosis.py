@@ -1,14 +1,14 @@
 """Which part lost what: inference, high level and bridge, or tracker."""
 
-from collections import Counter
-from collections.abc import Callable
+from collections import Counter, defaultdict
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from rich.table import Table
 
 from rebody.evaluation.changes import base_task_right
-from rebody.evaluation.evaluate import Trial, evaluate
+from rebody.evaluation.evaluate import POINT_MASS, Trial, evaluate
 from rebody.evaluation.results import EpisodeResult, Results
 from rebody.tasks import FAMILIES, Family
 from rebody.tasks.figures import LAST_S, tolerance
@@ -57,6 +57,12 @@ class Diagnosis:
     """One set of tasks, done by agents that differ by one part each."""
 
     results: dict[str, Results]
+    """By agent: `reuse` at least, which is enough to see where it stands at its end."""
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every agent of the ladder is there, so that it shows what each part costs."""
+        return self.results.keys() >= LADDER.keys()
 
     @property
     def families(self) -> list[Family]:
@@ -95,6 +101,22 @@ def diagnose(trial: Trial, specs: list[TaskSpec], seeds: int, tell: Callable[[st
     return Diagnosis(results)
 
 
+def diagnoses_among(results: Iterable[Results]) -> list[Diagnosis]:
+    """Of evaluations that are there already: one diagnosis per set of tasks that `reuse` did on a robot."""
+    comparable: defaultdict[Hashable, dict[str, Results]] = defaultdict(dict)
+    for result in results:
+        if result.agent in LADDER and result.robot != POINT_MASS and not result.thesis:
+            comparable[_conditions(result)].setdefault(result.agent, result)
+    return [Diagnosis(of) for of in comparable.values() if "reuse" in of]
+
+
+def _conditions(results: Results) -> Hashable:
+    """What agents of one ladder have in common."""
+    tasks = tuple((e.family, e.target, e.seed, str(e.switch), len(e.time_s)) for e in results.episodes)
+    parts = (results.robot, results.inference, results.tracker, *sorted(results.frozen.values()))
+    return parts, results.stride, results.horizon, tasks
+
+
 def shares_of(episode: EpisodeResult) -> Shares:
     """Means over the last 2 s; a velocity's are of its mean, so that a gait does not count."""
     family, target = episode.active_family[-1], episode.active_target[-1]
@@ -110,8 +132,9 @@ def shares_of(episode: EpisodeResult) -> Shares:
 
 
 def diagnosis_tables(diagnosis: Diagnosis) -> list[Table]:
-    """What each part costs, and where `reuse` stands at the end."""
-    return [_ladder(diagnosis), _standing(diagnosis), _failures(diagnosis)]
+    """What each part costs, if the ladder is complete, and where `reuse` stands at the end."""
+    ladder = [_ladder(diagnosis)] if diagnosis.is_complete else []
+    return [*ladder, _standing(diagnosis), _failures(diagnosis)]
 
 
 def _ladder(diagnosis: Diagnosis) -> Table:

@@ -15,11 +15,19 @@ from rebody.agents.build import (
     check_module_of,
     check_robot_of,
     check_step_predictor,
+    check_tracker_of,
     slot_chooser,
 )
 from rebody.agents.clock import Clock, EvenClock, PredictedClock
 from rebody.agents.controller import Controller, FlatController, TrackerController
-from rebody.agents.parts import Inference, LoadedFlat, LoadedSlots, LoadedStepPredictor, LoadedTracker
+from rebody.agents.parts import (
+    Inference,
+    LoadedFlat,
+    LoadedHighLevel,
+    LoadedSlots,
+    LoadedStepPredictor,
+    LoadedTracker,
+)
 from rebody.agents.rollout import Episodes, OnFrame, rollout_on_robot, rollout_on_toy
 from rebody.bodies import RobotSpec
 from rebody.bodies.toys import Toy
@@ -31,7 +39,8 @@ from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, Task
 
 POINT_MASS = "point-mass"
-THESIS_AGENTS = ("reuse", "readout", "bayes")
+THESIS_AGENTS = ("reuse", "retrain", "readout", "bayes")
+ROBOT_AGENTS = ("retrain", "flat")
 
 
 @dataclass(frozen=True)
@@ -45,6 +54,8 @@ class Trial:
     tracker: LoadedTracker | None
     flat: LoadedFlat | None = None
     """The policy of agent `flat`."""
+    high_level: LoadedHighLevel | None = None
+    """The policy of agent `retrain`."""
     slots: LoadedSlots | None = None
     """What chooses the slots of `reuse` on a robot, for a module of several families."""
     slots_by: SlotsBy = "classifier"
@@ -113,7 +124,10 @@ def trial_agent(trial: Trial, tasks: Task) -> Agent:
     slots = None
     if trial.agent == "reuse" and trial.robot is not None:
         slots = slot_chooser(trial.inference, trial.slots, trial.slots_by)
-    return build_agent(trial.agent, trial.inference, tasks, slots=slots, stride=stride, horizon=trial.horizon)
+    high_level = trial.high_level.policy if trial.high_level else None
+    return build_agent(
+        trial.agent, trial.inference, tasks, slots=slots, high_level=high_level, stride=stride, horizon=trial.horizon
+    )
 
 
 def run_trial(trial: Trial, agent: Agent, tasks: Task, seeds: np.ndarray) -> Episodes:
@@ -170,16 +184,20 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
     if trial.robot is None:
         if trial.thesis and trial.stride > 1:
             raise RebodyError("in thesis mode a stride counts control steps of a robot; a point mass has none.")
-        if trial.agent == "flat":
-            raise RebodyError("agent 'flat' moves the joints of a robot, and a point mass has none.")
+        if trial.agent in ROBOT_AGENTS:
+            raise RebodyError(f"agent '{trial.agent}' learned on a robot, and a point mass is none.")
         return
     slots = trial.tracker.tracker.slots if trial.tracker else slots_of(trial.robot.reach)
     trial.inference.contract.check_body(trial.robot.name, trial.robot.moving_fields, slots)
-    for part in (trial.tracker, trial.flat, trial.step_predictor):
+    for part in (trial.tracker, trial.flat, trial.high_level, trial.step_predictor):
         if part is not None:
             check_robot_of(part, trial.robot)
     if trial.flat is not None:
         check_module_of("flat policy", trial.flat, trial.inference)
+    if trial.high_level is not None:
+        assert trial.tracker is not None
+        check_module_of("high-level policy", trial.high_level, trial.inference)
+        check_tracker_of("high-level policy", trial.high_level, trial.tracker)
     if trial.step_predictor is not None:
         assert trial.tracker is not None
         check_step_predictor(trial.step_predictor, trial.tracker, trial.inference)

@@ -54,8 +54,16 @@ class EpisodeResult:
     @property
     def reached(self) -> list[float]:
         """The number that the last task is about, after each decision [m, m/s, rad]."""
-        series = {"goal": self.position_m, "velocity": self.velocity_m_s, "stand": self.pitch_rad}
-        return series[self.active_family[-1]]
+        return self.reached_of(self.active_family[-1])
+
+    @property
+    def families(self) -> list[str]:
+        """Families that were asked for, in their order in time."""
+        return list(dict.fromkeys(self.active_family))
+
+    def reached_of(self, family: str) -> list[float]:
+        """The number that a family is about, after each decision [m, m/s, rad]."""
+        return {"goal": self.position_m, "velocity": self.velocity_m_s, "stand": self.pitch_rad}[family]
 
     def to_json(self) -> dict[str, Any]:
         """Under the names of the file format."""
@@ -85,6 +93,11 @@ class Results:
     def of(self, family: str) -> list[EpisodeResult]:
         """Episodes whose last task is of that family."""
         return [episode for episode in self.episodes if episode.active_family[-1] == family]
+
+    @property
+    def families(self) -> list[str]:
+        """Names of those that episodes end with."""
+        return sorted({episode.active_family[-1] for episode in self.episodes})
 
     @cached_property
     def summary(self) -> dict[str, Any]:

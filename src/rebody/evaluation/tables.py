@@ -12,7 +12,7 @@ FIGURES = (
     ("median error", "median_error"),
     ("95th percentile", "p95_error"),
     ("within tolerance", "within_tolerance"),
-    ("ripple [m/s]", "ripple"),
+    (r"ripple \[m/s]", "ripple"),
 )
 """Of each family: what it is called, and where it stands in the summary."""
 CHANGES = ((r"base task right after \[s]", "noticed_s"), (r"within tolerance after \[s]", "recovered_s"))

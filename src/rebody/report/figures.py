@@ -16,18 +16,15 @@ FAMILY_COLOURS = (MOTION, BELIEF, IDLE)
 
 def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) -> None:
     """Trajectories and errors of each family, and what was believed, of three agents on the same tasks."""
-    families = sorted({episode.active_family[-1] for episode in results.episodes})
+    families = results.families
     columns = len(families) + 1
     with figure(path, 2, columns, size=(4.7 * columns, 7.4)) as (drawing, panels):
         for i, family in enumerate(families):
-            _trajectories(panels[i], results.of(family))
+            draw_trajectories(panels[i], results.of(family))
             agents = {"reuse": results, "oracle": oracle, "idle": idle}
             _errors(panels[columns + i], {name: of.of(family) for name, of in agents.items()}, family)
-        if len(families) > 1:
-            _kinds(panels[columns - 1], results, families)
-        else:
-            _latents(panels[columns - 1], results)
-        _readings(panels[-1], results, families)
+        draw_beliefs(panels[columns - 1], results)
+        draw_readings(panels[-1], results)
         drawing.suptitle(
             f"Inference module '{results.inference}', trained on a point mass, on the {results.robot}: "
             "the task is told to nobody but the oracle"
@@ -35,34 +32,41 @@ def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) 
 
 
 def plot_episode(episode: EpisodeResult, path: Path) -> None:
-    """One episode: what was reached, what was believed, what was asked of the tracker."""
-    with figure(path, 3, 1, size=(8.0, 7.5)) as (_, (reached, rewards, latents)):
-        draw_progress(reached, episode)
+    """One episode: what was reached and believed of each family that was asked for, the reward, the latent."""
+    families = episode.families
+    rows = len(families) + 2
+    with figure(path, rows, 1, size=(8.0, 2.5 * rows)) as (_, (*reached, rewards, latents)):
+        for axes, family in zip(reached, families, strict=True):
+            draw_progress(axes, episode, family)
         rewards.plot(episode.time_s, episode.reward, color=MOTION)
         rewards.set(ylabel="reward: all that is heard", xlabel="time [s]")
         latents.plot(episode.time_s, episode.latent)
         latents.set(ylabel="latent mean", xlabel="time [s]")
 
 
-def draw_progress(axes: Axes, episode: EpisodeResult, until: int | None = None) -> None:
-    """Reached, believed and true value over time, up to a decision."""
-    unit = _unit(episode.active_family[-1])
-    reached = episode.reached
-    axes.plot(episode.time_s, episode.active_target, "--", color=TRUTH, label="hidden target")
-    axes.plot(episode.time_s[:until], episode.inferred_target[:until], color=BELIEF, label="read from the belief")
-    axes.plot(episode.time_s[:until], reached[:until], color=MOTION, lw=2, label="robot")
-    spread = [*reached, *episode.active_target]
-    margin = 0.25 * max(np.ptp(spread), 1.0)
+def draw_progress(axes: Axes, episode: EpisodeResult, family: str, until: int | None = None) -> None:
+    """What a family is about, up to a decision: reached, read from the belief, and true while it was asked."""
+    time, reached = np.array(episode.time_s), np.array(episode.reached_of(family))
+    wanted = np.where(np.equal(episode.active_family, family), episode.active_target, np.nan)
+    read = np.where(np.equal(episode.inferred_family, family), episode.inferred_target, np.nan)
+    axes.plot(time, wanted, "--", color=TRUTH, label="hidden target")
+    axes.plot(time[:until], read[:until], ".", color=BELIEF, ms=4, label="read from the belief")
+    axes.plot(time[:until], reached[:until], color=MOTION, lw=1.5, label="robot")
+    spread = [*reached, *wanted[np.isfinite(wanted)]]
+    margin = 0.15 * max(np.ptp(spread), 1.0)
     axes.set(
         xlabel="time [s]",
-        ylabel=f"{episode.active_family[-1]} [{unit}]",
-        xlim=(0, episode.time_s[-1]),
+        ylabel=f"{family} [{_unit(family)}]",
+        xlim=(0, time[-1]),
         ylim=(min(spread) - margin, max(spread) + margin),
     )
-    axes.legend(loc="lower right", frameon=False, fontsize=8)
+    axes.set_title(" ", fontsize=8)  # room for the legend, which must not push panels apart
+    legend = axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False, fontsize=8, borderaxespad=0)
+    legend.set_in_layout(False)
 
 
-def _trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:
+def draw_trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:
+    """What the robot did in episodes of one family, each target a dot of its colour at the end."""
     largest, family = max(abs(e.active_target[-1]) for e in episodes) or 1.0, episodes[0].active_family[-1]
     for episode in episodes:
         colour = plt.get_cmap(TASKS)(0.5 + 0.5 * episode.active_target[-1] / largest)
@@ -71,9 +75,17 @@ def _trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:
     axes.set(xlabel="time [s]", ylabel=f"{family} [{_unit(family)}]", title=f"{family}: robot (lines), targets (dots)")
 
 
-def _kinds(axes: Axes, results: Results, families: list[str]) -> None:
+def draw_beliefs(axes: Axes, results: Results) -> None:
+    """The latents at the end."""
+    if len(results.families) > 1 and len(results.episodes[0].latent[0]) > 1:
+        _kinds(axes, results)
+    else:
+        _latents(axes, results)
+
+
+def _kinds(axes: Axes, results: Results) -> None:
     """Which of several families it is shows in the latent's first numbers."""
-    for family, colour in zip(families, FAMILY_COLOURS, strict=False):
+    for family, colour in zip(results.families, FAMILY_COLOURS, strict=False):
         final = np.array([episode.latent[-1] for episode in results.of(family)])
         axes.plot(final[:, 0], final[:, 1], ".", color=colour, label=family)
     axes.set(xlabel="latent 1", ylabel="latent 2", title="the belief at the end: what kind of task")
@@ -91,9 +103,9 @@ def _latents(axes: Axes, results: Results) -> None:
     axes.legend(frameon=False)
 
 
-def _readings(axes: Axes, results: Results, families: list[str]) -> None:
+def draw_readings(axes: Axes, results: Results) -> None:
     """What a linear probe reads from the last belief, over what is true."""
-    for family, colour in zip(families, FAMILY_COLOURS, strict=False):
+    for family, colour in zip(results.families, FAMILY_COLOURS, strict=False):
         of = results.of(family)
         truth = [episode.active_target[-1] for episode in of]
         read = [episode.inferred_target[-1] for episode in of]

@@ -80,8 +80,12 @@ def _poles(episode: EpisodeResult, decision: int) -> list[Pole]:
 
 
 def _plot(episode: EpisodeResult, until: int) -> UInt8[np.ndarray, "height width 3"]:
-    drawing, axes = plt.subplots(figsize=(WIDTH / 100, PLOT_HEIGHT / 100), dpi=100, layout="constrained")
-    draw_progress(axes, episode, until)
+    size, families = (WIDTH / 100, PLOT_HEIGHT / 100), episode.families
+    drawing, panels = plt.subplots(1, len(families), figsize=size, dpi=100, layout="constrained", squeeze=False)
+    for axes, family in zip(panels[0], families, strict=True):
+        draw_progress(axes, episode, family, until)
+    if len(families) > 1:
+        panels[0, 1].get_legend().remove()  # one is enough, and there is no room for two
     drawing.canvas.draw()
     pixels = np.array(drawing.canvas.buffer_rgba())[..., :3]  # pyright: ignore[reportAttributeAccessIssue] (Agg)
     plt.close(drawing)

@@ -1,7 +1,7 @@
 """Files that last: artifacts (trained parts, shared) and checkpoints (runs, continued)."""
 
 from rebody.store.artifact import Artifact, load_artifact, recover, save_artifact, shipped_artifacts
-from rebody.store.checkpoint import load_checkpoint, save_checkpoint
+from rebody.store.checkpoint import load_checkpoint, read_meta, save_checkpoint
 from rebody.store.trees import arrays_into_tree, tree_hash, tree_to_arrays
 
 __all__ = [
@@ -9,6 +9,7 @@ __all__ = [
     "arrays_into_tree",
     "load_artifact",
     "load_checkpoint",
+    "read_meta",
     "recover",
     "save_artifact",
     "save_checkpoint",

@@ -67,15 +67,15 @@ def save_artifact(path: Path, *, kind: str, config: dict[str, Any], weights: Any
     return path
 
 
-def load_artifact(reference: str | Path, kind: str) -> Artifact:
-    """Load a shipped artifact by name, or one from a folder; a `Path` is always a folder.
+def load_artifact(reference: str | Path, kind: str | None = None) -> Artifact:
+    """Load a shipped artifact by name, or one from a folder; a `Path` is always a folder. Without `kind`: of any.
 
     Raises:
         RebodyError: it is unknown, incomplete, damaged, of another kind or of another format version.
     """
     path = _find(reference, kind)
     manifest = _read_manifest(path)
-    if manifest["kind"] != kind:
+    if kind not in (None, manifest["kind"]):
         raise RebodyError(
             f"{reference} is an artifact of kind {manifest['kind']!r}; one of kind {kind!r} is needed here. "
             + _shipped_of(kind)
@@ -84,7 +84,7 @@ def load_artifact(reference: str | Path, kind: str) -> Artifact:
     return Artifact(
         name=os.path.basename(os.path.abspath(reference)),
         path=path,
-        kind=kind,
+        kind=manifest["kind"],
         config=_parse_object(content[CONFIG], path / CONFIG),
         arrays=_parse_weights(content[WEIGHTS], path / WEIGHTS),
         card=content[CARD].decode(),
@@ -171,7 +171,7 @@ def _retire(backup: Path, path: Path) -> None:
 # reading
 
 
-def _find(reference: str | Path, kind: str) -> Path:
+def _find(reference: str | Path, kind: str | None) -> Path:
     """The folder that a shipped name or a path stands for."""
     if isinstance(reference, str) and (SHIPPED / reference / MANIFEST).is_file():
         return SHIPPED / reference
@@ -183,19 +183,20 @@ def _find(reference: str | Path, kind: str) -> Path:
     raise RebodyError(_unknown(str(reference), kind))
 
 
-def _unknown(reference: str, kind: str) -> str:
+def _unknown(reference: str, kind: str | None) -> str:
     close = difflib.get_close_matches(reference, _names_of(kind), n=1)
     guess = f" Did you mean {close[0]!r}?" if close else ""
     return f"no artifact or folder called {reference!r}.{guess} {_shipped_of(kind)}"
 
 
-def _names_of(kind: str) -> list[str]:
-    return [name for name, of_kind in shipped_artifacts() if of_kind == kind]
+def _names_of(kind: str | None) -> list[str]:
+    return [name for name, of_kind in shipped_artifacts() if kind in (None, of_kind)]
 
 
-def _shipped_of(kind: str) -> str:
+def _shipped_of(kind: str | None) -> str:
     names = ", ".join(_names_of(kind)) or "none"
-    return f"Shipped artifacts of kind {kind!r}: {names}. Give one of these, or a folder of your own."
+    of_kind = "" if kind is None else f" of kind {kind!r}"
+    return f"Shipped artifacts{of_kind}: {names}. Give one of these, or a folder of your own."
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:

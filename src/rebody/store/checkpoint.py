@@ -55,6 +55,22 @@ def load_checkpoint(
     path = folder / FILE
     if not path.exists():
         return None
+    arrays, meta = _read_checked(path)
+    check(meta)
+    return arrays_into_tree(template, arrays, f"checkpoint {path}"), meta
+
+
+def read_meta(folder: Path) -> dict[str, Any] | None:
+    """What was saved beside the state; None if the folder has no checkpoint.
+
+    Raises:
+        RebodyError: it is damaged, or of another format version.
+    """
+    path = folder / FILE
+    return _read_checked(path)[1] if path.exists() else None
+
+
+def _read_checked(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     header, arrays = _read(path)
     if header.get("format_version") != FORMAT_VERSION:
         raise RebodyError(
@@ -64,9 +80,7 @@ def load_checkpoint(
     meta_json = header.get("meta", "")
     if header.get("sha256") != _sha256(arrays, meta_json):
         raise _damaged(path)
-    meta = json.loads(meta_json)
-    check(meta)
-    return arrays_into_tree(template, arrays, f"checkpoint {path}"), meta
+    return arrays, json.loads(meta_json)
 
 
 def _sha256(arrays: dict[str, np.ndarray], meta_json: str) -> str:

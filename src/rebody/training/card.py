@@ -16,17 +16,25 @@ from rebody.training.run import Run
 
 def card(title: str, what: str, run: Run, seed: int, figures: Mapping[str, str]) -> str:
     """Markdown: what it is, the exact command and seed that made it, wall time, machine, figures."""
-    # a resumed run ends as the uninterrupted one would have
-    command = shlex.join([Path(sys.argv[0]).name, *(argument for argument in sys.argv[1:] if argument != "--resume")])
     machine = f"{os.cpu_count()} x {_processor()}, {platform.system()}, Python {platform.python_version()}"
-    versions = f"rebody {__version__}, JAX {jax.__version__}, MuJoCo {mujoco.__version__}"
     rows = "\n".join(f"| {name} | {value} |" for name, value in figures.items())
     return (
         f"# {title}\n\n{what}\n\n"
-        f"- Made by: `{command}`\n- Seed: {seed}\n- Training time: {run.wall_s / 60:.1f} minutes\n"
-        f"- Machine: {machine}\n- Versions: {versions}\n\n"
+        f"- Made by: `{command_line()}`\n- Seed: {seed}\n- Training time: {run.wall_s / 60:.1f} minutes\n"
+        f"- Machine: {machine}\n- Versions: {versions()}\n\n"
         f"Measured by the same command after training:\n\n| figure | value |\n|---|---|\n{rows}\n"
     )
+
+
+def command_line() -> str:
+    """The command that is running, fit for a shell."""
+    # a resumed run ends as the uninterrupted one would have
+    return shlex.join([Path(sys.argv[0]).name, *(argument for argument in sys.argv[1:] if argument != "--resume")])
+
+
+def versions() -> str:
+    """Of what results depend on most."""
+    return f"rebody {__version__}, JAX {jax.__version__}, MuJoCo {mujoco.__version__}"
 
 
 def _processor() -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
+from jaxtyping import Float
 from tensorboardX import SummaryWriter
 
 from rebody.errors import RebodyError
@@ -127,6 +128,13 @@ class Run:
         self.history.append(metrics)
         for name, value in metrics.items():
             writer.add_scalar(name, value, iteration)
+
+
+def read_log(text: str) -> dict[str, Float[np.ndarray, " iteration"]]:
+    """The columns of a `Run.log`, NaN where nothing was measured."""
+    table = csv.DictReader(io.StringIO(text))
+    rows = list(table)
+    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in table.fieldnames or ()}
 
 
 @contextmanager

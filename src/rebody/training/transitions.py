@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, PRNGKeyArray
 
 from rebody.control import sac
-from rebody.control.sac import SACBatch, SACConfig, SACState
+from rebody.control.sac import Critics, Judge, SACBatch, SACConfig, SACState
 from rebody.types import AnyArray
 
 
@@ -23,8 +23,8 @@ def no_transitions(rows: int, features: int, actions: int) -> SACBatch:
 
 @eqx.filter_jit
 def learn(
-    policy: SACState, batches: SACBatch, key: PRNGKeyArray, config: SACConfig
+    policy: SACState, batches: SACBatch, key: PRNGKeyArray, config: SACConfig, judge: Judge = Critics.__call__
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """One update of soft actor-critic per batch; `batches` have the update first in every array."""
     keys = jax.random.split(key, len(batches.reward))
-    return sac.update_many(policy, lambda batch, _: batch, batches, keys, config)
+    return sac.update_many(policy, lambda batch, _: batch, batches, keys, config, judge)

@@ -61,7 +61,7 @@ def test_rows_of_the_ring_belong_together(batch, config, counted):
                 ring.command.value[here] - ring.motion.displacement[here], ring.command.value[after], atol=1e-5
             )
     last = (seen - config.robots + np.arange(config.robots)) % config.replay
-    np.testing.assert_array_equal(ring.next_joints[last], batch.joint_state())
+    np.testing.assert_array_equal(ring.next_joints[last], batch.tracker_state())
     np.testing.assert_allclose(ring.motion.pitch[last], batch.spec.pitch(batch.qpos), rtol=1e-6)
     for number in range(seen - config.replay, seen):
         moved[number % config.robots] += ring.motion.displacement[number % config.replay]

@@ -1,7 +1,5 @@
 """What figures are drawn from: named arrays, out of training logs and of episodes."""
 
-import csv
-import io
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +9,7 @@ import safetensors.numpy
 from rebody.evaluation.evaluate import Trial, check_trial, run_trial, trial_agent
 from rebody.store import load_artifact
 from rebody.tasks.task_file import TaskSpec, active_tasks
+from rebody.training.run import read_log
 from rebody.types import DECISION_DT
 
 Data = dict[str, np.ndarray]
@@ -36,8 +35,7 @@ def training_log(artifact: str | Path, kind: str) -> Data:
     `steps` counts steps of the toy or control steps of the robots.
     """
     loaded = load_artifact(artifact, kind)
-    rows = list(csv.DictReader(io.StringIO(loaded.log)))
-    data = {name: np.array([float(row[name] or "nan") for row in rows], np.float32) for name in rows[0]}
+    data = {name: column.astype(np.float32) for name, column in read_log(loaded.log).items()}
     settings = loaded.config["training"]
     per_iteration = (
         settings["episodes"] * settings["decisions"] if kind == "inference" else settings["robots"] * settings["steps"]

@@ -19,26 +19,16 @@ from rebody.control.flat import FlatPolicy, flat_observation
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.tracker import relative, slots_of, tracker_reward
 from rebody.errors import RebodyError
-from rebody.inference import Encoder, EncoderCarry
-from rebody.tasks import BaseTask, RewardForm, TaskDistribution, reward
 from rebody.training.flat.config import FlatConfig
 from rebody.training.flat.report import measure, save_flat
+from rebody.training.minds import Minds, listen, new_minds, put_on_feet
 from rebody.training.motion import motion_of
 from rebody.training.ring import draw, write
 from rebody.training.run import Metrics, Run
 from rebody.training.transitions import learn, no_transitions
-from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task, Transition
+from rebody.types import AnyArray, Belief, Subgoal, Task
 
 EVALUATE_EVERY = 50
-
-
-class Minds(eqx.Module):
-    """What each robot's frozen module remembers and believes, and the task that is hidden from it."""
-
-    encoder: EncoderCarry
-    belief: Belief
-    state: GlobalState  # at the last decision
-    task: Task
 
 
 class RunState(eqx.Module):
@@ -147,31 +137,6 @@ def observe(batch: RobotBatch, belief: Belief, module: Inference) -> Float[np.nd
     """What the flat policy sees of each robot."""
     joints = batch.joint_state()
     return np.asarray(flat_observation(joints, batch.x.astype(np.float32), belief, reach(module)))
-
-
-def put_on_feet(batch: RobotBatch, rng: np.random.Generator) -> None:
-    """A robot that has fallen is put on its feet where it lies: episode and belief go on."""
-    fallen, x = batch.fallen, batch.x
-    batch.reset(rng, fallen)
-    batch.qpos[fallen, batch.spec.root_addresses[0]] = x[fallen]
-
-
-def new_minds(batch: RobotBatch, module: Inference, key: PRNGKeyArray) -> Minds:
-    """Fresh hidden tasks, and nothing known about them."""
-    encoder, shape = module.parts.module.encoder, (batch.size,)
-    base_tasks = [BaseTask(name, low, high) for name, (low, high) in module.contract.target_ranges.items()]
-    task = TaskDistribution(tuple(base_tasks)).sample(key, shape)
-    return Minds(encoder.initial(shape), encoder.prior(shape), batch.spec.observe(batch.qpos, batch.qpos), task)
-
-
-@eqx.filter_jit
-def listen(
-    encoder: Encoder, minds: Minds, now: GlobalState, form: RewardForm
-) -> tuple[Minds, Float[AnyArray, " robot"]]:
-    """Every robot's module takes in the decision that ended now."""
-    earned = reward(minds.task, now, form)
-    carry, belief = encoder.step(minds.encoder, Transition(minds.state, earned, now))
-    return Minds(carry, belief, now, minds.task), earned
 
 
 def initial_state(

@@ -68,7 +68,7 @@ def goal_velocity() -> MetaConfig:
             projections=16,
             discount=0.95,
             learning_rate=5e-4,
-            decay_updates=61_000,
+            decay_updates=80_000,
             huber=0.05,
         ),
         prior="mixture",
@@ -81,7 +81,7 @@ def goal_velocity() -> MetaConfig:
         switch_share=0.5,
         episodes=96,
         wander_iterations=25,
-        joint_iterations=95,
+        joint_iterations=125,
         policy_iterations=0,
         policy_updates=640,
     )
@@ -123,6 +123,8 @@ def goal_velocity_stand() -> MetaConfig:
         inference=replace(base.inference, fields=("x", "vx", "pitch"), scales=(10.0, 3.0, 1.5), latent=9, kinds=3),
         policy_fields=("vx", "pitch", "pitch_rate"),
         policy_scales=(3.0, 1.5, 3.0),
+        joint_iterations=95,
+        sac=replace(base.sac, decay_updates=61_000),
     )
 
 

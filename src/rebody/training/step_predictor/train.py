@@ -125,7 +125,7 @@ def initial_state(
 ) -> RunState:
     """Robots with a first subgoal, an empty replay, a fresh policy or that of an artifact."""
     nothing = Command(np.zeros(batch.size, np.int32), np.zeros(batch.size, np.float32))
-    features = tracker_observation(batch.joint_state(), nothing, tracker.reach).shape[-1]
+    features = tracker_observation(batch.tracker_state(), nothing, tracker.reach).shape[-1]
     policy = sac.initial_state(features, 1, config.sac, key)
     if init_from is not None:
         policy = sac.take_over(policy, load_step_predictor(init_from).predictor.actor, init_from)

@@ -65,7 +65,7 @@ class TrackerEnv(gymnasium.Env):
         self._steps_left = int(self.np_random.integers(shortest, longest + 1))
 
     def _observe(self, command: Command) -> np.ndarray:
-        joints = self._batch.joint_state()
+        joints = self._batch.tracker_state()
         return np.asarray(_observation(joints, command, self._config))[0]
 
 

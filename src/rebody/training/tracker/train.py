@@ -111,13 +111,13 @@ def collect(
             follow_guides(orders, spec.observe(batch.qpos, state.previous_qpos), config)
             state.previous_qpos[:] = batch.qpos
         push(batch, config, rng)
-        joints, before, command = batch.joint_state(), batch.qpos.copy(), commands(orders, batch)
+        joints, before, command = batch.tracker_state(), batch.qpos.copy(), commands(orders, batch)
         action = np.asarray(_explore(state.sac.actor, joints, command, action_key, config))
         batch.step(action)
         seen = Replay(
             joints=joints,
             action=action,
-            next_joints=batch.joint_state(),
+            next_joints=batch.tracker_state(),
             motion=motion_of(batch, before),
             command=command,
         )
@@ -185,7 +185,7 @@ def initial_state(
 ) -> RunState:
     """Robots without orders, an empty replay, a fresh policy or that of an artifact."""
     spec, rows = batch.spec, config.replay
-    joints = batch.joint_state()
+    joints = batch.tracker_state()
     still = Command(np.zeros(len(joints), np.int32), np.zeros(len(joints), np.float32))
     moved = np.zeros(rows, np.float32)
     observed = tracker_observation(joints, still, config.reach).shape[-1]

@@ -1,0 +1,72 @@
+"""A high-level policy that was learned on a robot (thesis 5.6.2, 6.5): a value per slot, the largest is the subgoal."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float, PRNGKeyArray
+
+from rebody.bodies.robot import Reach
+from rebody.control.high_level import PolicyView
+from rebody.control.sac import Actor, Critics
+from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.types import AnyArray, Belief, GlobalState, Subgoal
+
+Slots = tuple[tuple[int, float], ...]
+"""Of each slot the family, and what a value of 1 asks for [m ahead of the robot, m/s, rad]."""
+SOFTNESS = 0.1
+"""While it learns, a slot is drawn by a softmax of |value| over this; afterwards the largest |value| has it."""
+
+
+class SlotPolicy(eqx.Module):
+    """(global state, belief) -> subgoal."""
+
+    actor: Actor
+    view: PolicyView = eqx.field(static=True)
+    slots: Slots = eqx.field(static=True)
+
+    def __call__(self, state: GlobalState, belief: Belief) -> Subgoal:
+        """The subgoal of the largest |value|."""
+        return subgoal_of(pool(self.actor(self.view(state, belief))), state, self.slots)
+
+
+def slots_within(families: tuple[int, ...], reach: Reach) -> Slots:
+    """A slot for each family, its scale the largest that may be asked of the robot."""
+    largest = {GOAL: reach.distance, VELOCITY: max(map(abs, reach.speed)), STAND: max(map(abs, reach.pitch or (0.0,)))}
+    return tuple((family, largest[family]) for family in families)
+
+
+def pool(values: Float[AnyArray, "*batch slot"]) -> Float[AnyArray, "*batch slot"]:
+    """The largest |value| with its sign, zero in all other slots."""
+    return _keep(values, jnp.abs(values))
+
+
+def draw(values: Float[AnyArray, "*batch slot"], key: PRNGKeyArray) -> Float[AnyArray, "*batch slot"]:
+    """Pooled, but the slot drawn by a softmax of |value|."""
+    return _keep(values, jnp.abs(values) / SOFTNESS + jax.random.gumbel(key, values.shape))
+
+
+def judge(
+    critics: Critics, observation: Float[AnyArray, "*batch observation"], values: Float[AnyArray, "*batch slot"]
+) -> Float[AnyArray, "2 *batch"]:
+    """What the critics, which see pooled values, expect of a slot that will be drawn.
+
+    The mean over the slots with their chances: so the gradient reaches the value of each slot through its own pooled
+    vector, and the choice through the chances. Through the largest alone no choice could be learned.
+    """
+    slots = values.shape[-1]
+    pooled = values[..., None, :] * jnp.eye(slots)
+    seen = jnp.broadcast_to(observation[..., None, :], (*values.shape, observation.shape[-1]))
+    chance = jax.nn.softmax(jnp.abs(values) / SOFTNESS, axis=-1)
+    return jnp.sum(chance * critics(seen, pooled), axis=-1)
+
+
+def subgoal_of(pooled: Float[AnyArray, "*batch slot"], state: GlobalState, slots: Slots) -> Subgoal:
+    """What a pooled vector asks for in this state: a goal is a point in the world that far ahead."""
+    families, scales = map(jnp.asarray, zip(*slots, strict=True))
+    family = families[jnp.argmax(jnp.abs(pooled), axis=-1)]
+    value = jnp.sum(pooled * scales, axis=-1)
+    return Subgoal(family, jnp.where(family == GOAL, state.x + value, value))
+
+
+def _keep(values, strength):
+    return values * jax.nn.one_hot(jnp.argmax(strength, axis=-1), values.shape[-1])

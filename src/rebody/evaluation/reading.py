@@ -1,0 +1,68 @@
+"""Results read back from the JSON of an evaluation."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from rebody.errors import RebodyError
+from rebody.evaluation.results import VERSION, EpisodeResult, Results
+from rebody.tasks import family_index
+
+WANTED = "such a file is written by `rebody evaluate --json`"
+
+
+def read_results(path: Path) -> Results:
+    """What `save_results` wrote; RebodyError that says what is wrong with another file."""
+    content = _content(path)
+    if not _holds_results(content):
+        raise RebodyError(f"{path} holds no results of an evaluation: {WANTED}.")
+    if content["version"] != VERSION:
+        raise RebodyError(
+            f"{path} has version {content['version']}; this rebody reads version {VERSION}. "
+            "Evaluate anew, or install the version of rebody that made it."
+        )
+    try:
+        episodes = msgspec.convert(content["episodes"], list[dict[str, Any]])
+        of_fields = [entry | {"return_": entry.get("return"), "switch": entry.get("switch")} for entry in episodes]
+        results = msgspec.convert(content | {"episodes": of_fields}, Results)
+        _check(results.episodes)
+    except (msgspec.ValidationError, RebodyError) as error:
+        raise RebodyError(f"{path} was edited or cut short: {error}. {WANTED.capitalize()}.") from None
+    return results
+
+
+def holds_results(path: Path) -> bool:
+    """Whether a file is a JSON of an evaluation, be it of another version."""
+    try:
+        return _holds_results(_content(path))
+    except RebodyError:
+        return False
+
+
+def _content(path: Path) -> Any:
+    try:
+        return msgspec.json.decode(path.read_bytes())
+    except msgspec.DecodeError as error:
+        raise RebodyError(f"{path} is not a JSON file ({error}): {WANTED}.") from None
+
+
+def _holds_results(content: Any) -> bool:
+    return isinstance(content, dict) and {"version", "agent", "episodes"} <= content.keys()
+
+
+def _check(episodes: list[EpisodeResult]) -> None:
+    if not episodes:
+        raise RebodyError("there is no episode")
+    for episode in episodes:
+        _check_series(episode)
+
+
+def _check_series(episode: EpisodeResult) -> None:
+    """RebodyError where lists are not as long as the episode, or name a family that there is not."""
+    decisions = len(episode.time_s)
+    series = {name: value for name, value in vars(episode).items() if isinstance(value, list)}
+    if uneven := [name for name, value in series.items() if len(value) != decisions or not value]:
+        raise RebodyError(f"an episode of {decisions} decisions has a '{uneven[0]}' of {len(series[uneven[0]])}")
+    for family in {*episode.active_family, *episode.inferred_family}:
+        family_index(family)

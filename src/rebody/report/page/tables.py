@@ -1,0 +1,64 @@
+"""Tables of the terminal, and of episodes, for a page."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rich.table import Table
+from rich.text import Text
+
+from rebody.evaluation.results import EpisodeResult, Results
+
+
+@dataclass(frozen=True)
+class PageTable:
+    """Plain text, row by row."""
+
+    title: str
+    header: list[str]
+    rows: list[list[str]]
+    caption: str = ""
+
+
+def from_terminal(table: Table, header: Sequence[str] | None = None) -> PageTable:
+    """A table that is made for the terminal, with other words above its columns where some are given."""
+    columns = [[_plain(cell) for cell in column.cells] for column in table.columns]
+    return PageTable(
+        title=_plain(table.title),
+        header=list(header or (_plain(column.header) for column in table.columns)),
+        rows=[list(row) for row in zip(*columns, strict=True)],
+        caption=_plain(table.caption),
+    )
+
+
+def episodes_table(results: Results) -> PageTable:
+    """A row per episode: the task, what was believed of it in the end, and how it went."""
+    header = [
+        "hidden task", "seed", "read from the belief", "final error", "ripple [m/s]", "return", "oracle's return",
+        "fell",
+    ]  # fmt: skip
+    return PageTable("", header, [_row(episode) for episode in results.episodes])
+
+
+def _row(episode: EpisodeResult) -> list[str]:
+    return [
+        _task(episode),
+        str(episode.seed),
+        f"{episode.inferred_family[-1]} {episode.inferred_target[-1]:+.3f}",
+        f"{episode.final_error:.3f}",
+        f"{episode.ripple_m_s:.3f}",
+        f"{episode.return_:.2f}",
+        "-" if episode.oracle_return is None else f"{episode.oracle_return:.2f}",
+        "fell" if episode.fell else "",
+    ]
+
+
+def _task(episode: EpisodeResult) -> str:
+    text = f"{episode.family} {episode.target:+.3g}"
+    if episode.switch is None:
+        return text
+    return f"{text}, from {episode.switch['at_s']:g} s {episode.switch['family']} {episode.switch['target']:+.3g}"
+
+
+def _plain(cell: object) -> str:
+    """Without the terminal's marks."""
+    return "" if cell is None else Text.from_markup(str(cell)).plain.replace("`", "")

@@ -1,0 +1,40 @@
+"""Settings of a training run of a robot's high-level policy."""
+
+from dataclasses import dataclass, field
+
+from rebody.control.sac import SACConfig
+
+
+@dataclass(frozen=True)
+class HighLevelConfig:
+    """One training run of a high-level policy."""
+
+    robots: int = 64
+    """Copies that move in parallel."""
+    steps: int = 25
+    """Decisions of each robot in an iteration."""
+    updates: int = 512
+    """Updates in an iteration."""
+    iterations: int = 160
+    """Length of the run."""
+    replay: int = 300_000
+    """Decisions kept."""
+    decisions: int = 100
+    """Length of an episode: 10 s."""
+    arrival: float = 0.05
+    """Added to the scaled reward r of a decision when r = 0, as on the toy: it pulls the last centimetres."""
+    arrival_width: float = 0.02
+    """Half of it is added at r = -arrival_width."""
+    fall: float = 5.0
+    """Taken from the reward of a decision in which the robot fell."""
+    sac: SACConfig = field(
+        default_factory=lambda: SACConfig(
+            hidden=(128, 128),
+            projections=16,
+            discount=0.95,
+            learning_rate=5e-4,
+            decay_updates=80_000,
+            huber=0.05,
+        )
+    )
+    """Hyperparameters of soft actor-critic."""

@@ -1,0 +1,77 @@
+"""One value per slot: the largest is the subgoal, and learning finds both the slot and its value."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rebody.bodies.robot import Reach
+from rebody.control.sac import Critics, SACBatch, SACConfig, initial_state, update_many
+from rebody.control.slot_policy import SOFTNESS, draw, judge, pool, slots_within, subgoal_of
+from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.types import GlobalState
+
+SLOTS = ((GOAL, 5.0), (VELOCITY, 2.0), (STAND, 1.0))
+VALUES = np.array([[0.3, -0.4, 0.1], [-0.9, 0.2, 0.8], [0.0, 0.0, 0.0]], np.float32)
+
+
+def at(x):
+    still = np.zeros_like(x)
+    return GlobalState(x, *[still] * 7)
+
+
+def test_the_largest_value_stays_with_its_sign():
+    np.testing.assert_allclose(pool(VALUES), [[0, -0.4, 0], [-0.9, 0, 0], [0, 0, 0]])
+
+
+def test_a_value_asks_for_its_share_of_what_the_robot_reaches():
+    """A goal lies that far ahead of where the robot is."""
+    x = np.array([10.0, 10.0, 10.0], np.float32)
+    subgoal = subgoal_of(pool(VALUES), at(x), SLOTS)
+    np.testing.assert_array_equal(subgoal.slot, [VELOCITY, GOAL, GOAL])
+    np.testing.assert_allclose(subgoal.value, [-0.8, 10 - 4.5, 10.0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("families", [(GOAL,), (GOAL, VELOCITY), (GOAL, VELOCITY, STAND)])
+def test_there_is_a_slot_for_each_family_of_the_module(families):
+    slots = slots_within(families, Reach(speed=(-1.3, 2.3), distance=5.0, pitch=(-1.0, 0.5)))
+    assert slots == ((GOAL, 5.0), (VELOCITY, 2.3), (STAND, 1.0))[: len(families)]
+
+
+def test_while_it_learns_a_slot_is_drawn_by_its_value():
+    keys = jax.random.split(jax.random.key(0), 4000)
+    drawn = jax.vmap(lambda key: draw(jnp.array([0.2, -0.1]), key))(keys)
+    first = drawn[:, 0] != 0
+    np.testing.assert_allclose(drawn, np.where(first[:, None], [[0.2, 0]], [[0, -0.1]]))
+    assert first.mean() == pytest.approx(1 / (1 + np.exp(-0.1 / SOFTNESS)), abs=0.03)
+
+
+def test_judgement_is_the_mean_over_what_may_be_done():
+    critics = Critics(1 + 2, SACConfig(hidden=(8,)), jax.random.key(0))
+    observation, values = jnp.array([[0.7]]), jnp.array([[0.2, -0.1]])
+    alone = [critics(observation, jnp.array([pooled])) for pooled in ([0.2, 0.0], [0.0, -0.1])]
+    chance = 1 / (1 + np.exp(-0.1 / SOFTNESS))
+    np.testing.assert_allclose(
+        judge(critics, observation, values), chance * alone[0] + (1 - chance) * alone[1], rtol=1e-4
+    )
+
+
+def test_it_learns_which_slot_and_how_much():
+    """Two slots that pay most at 0.5 and -0.6, the second twice as much where a sign is seen, else half."""
+    rows = 2000
+    keys = jax.random.split(jax.random.key(1), 4)
+    sign = jnp.where(jax.random.bernoulli(keys[0], shape=(rows,)), 1.0, -1.0)
+    values = jax.random.uniform(keys[1], (rows, 2), minval=-1.0)
+    action = values * jax.nn.one_hot(jax.random.randint(keys[2], (rows,), 0, 2), 2)
+    first, second = 1 - jnp.abs(action[:, 0] - 0.5), 1 - jnp.abs(action[:, 1] + 0.6)
+    paid = jnp.where(action[:, 0] != 0, first, (1.5 + sign) / 1.25 * second)
+    data = SACBatch(sign[:, None], action, paid, sign[:, None], jnp.ones(rows))
+    config = SACConfig(hidden=(32, 32), learning_rate=3e-3, decay_updates=1500, initial_temperature=1e-3, batch_size=64)
+
+    def batch_of(_, key):
+        return jax.tree.map(lambda leaf: leaf[jax.random.randint(key, (64,), 0, rows)], data)
+
+    state = initial_state(1, 2, config, keys[3])
+    state, _ = update_many(state, batch_of, None, jax.random.split(keys[3], 1500), config, judge)
+    chosen = pool(state.averaged_actor(jnp.array([[1.0], [-1.0]])))
+    np.testing.assert_allclose(chosen, [[0, -0.6], [0.5, 0]], atol=0.1)
