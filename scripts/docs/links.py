@@ -10,7 +10,7 @@ import posixpath
 import re
 from pathlib import Path
 
-from reference import BESIDE, PACKAGES
+from reference import BESIDE
 
 LINK = re.compile(r"\[(?P<text>[^\]]*)\]\((?P<path>[^)#:\s]+)(?P<anchor>#[^)\s]*)?\)")
 SCRIPT = re.compile(r"^\[[^\]]*\]\(\.\./(examples/\S+\.py)\)$", re.MULTILINE)
@@ -25,9 +25,9 @@ def on_page_markdown(markdown, page, config, **_):
 
 
 def symbol(text: str, path: str) -> str:
-    """What a link to code names: its text, in the module of that path."""
-    module = path.removeprefix("src/").removesuffix(".py").replace("/", ".")
-    return f"{module}.{text.strip('`')}"
+    """What a link to code names: a thing in the module of that path, or the module itself by its full name."""
+    name = text.strip("`")
+    return name if name.startswith("rebody.") else f"{path[len('src/') : -len('.py')].replace('/', '.')}.{name}"
 
 
 def _on_site(link: re.Match, folder: str) -> str:
@@ -35,9 +35,7 @@ def _on_site(link: re.Match, folder: str) -> str:
     path = posixpath.normpath(posixpath.join(folder, link["path"]))
     if path in BESIDE:
         return f"[{text}]({BESIDE[path]}{anchor})"
-    if path in PACKAGES:
-        return f"[{text}]({PACKAGES[path]}{anchor})"
-    if path.startswith("src/"):
+    if path.startswith("src/rebody/"):
         return f"[{text}][{symbol(text, path)}]"
     if path.startswith("docs/"):
         return f"[{text}]({path.removeprefix('docs/')}{anchor})"

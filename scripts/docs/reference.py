@@ -19,10 +19,14 @@ BESIDE = {
     "benchmarks/README.md": "benchmarks.md",
 }
 """Pages of the repository outside docs/, and where they are on the site."""
-MIXTURE = "src/rebody/inference/mixture"
-NAMES = ("agents", "inference", "control", "bodies", "tasks", "envs", "training", "evaluation", "store")
-PACKAGES = {f"src/rebody/{name}": f"api/{name}.md" for name in NAMES} | {MIXTURE: "api/mixture.md"}
-"""Public packages, and the page of each."""
+API = {
+    f"api/{path.removesuffix('.py').replace('/', '.')}.md": f"src/rebody/{path}"
+    for path in (
+        *("evaluation", "training", "agents", "envs", "inference", "inference/mixture", "control", "bodies", "tasks"),
+        *("store", "nn", "types.py", "errors.py"),
+    )
+}
+"""Pages of the Python API, and the package or module that each shows."""
 SUBCOMMAND = re.compile(r"• ([\w-]+)")
 """How a help lists them."""
 COLUMNS = "84"
@@ -34,8 +38,8 @@ def on_files(files, config):
     for path, uri in BESIDE.items():
         if uri not in files.src_uris:
             files.append(File.generated(config, uri, content=(root / path).read_text()))
-    for package, uri in PACKAGES.items():
-        files.append(File.generated(config, uri, content=_api(root, package)))
+    for uri, path in API.items():
+        files.append(File.generated(config, uri, content=_api(root, root / path)))
     return files
 
 
@@ -56,19 +60,17 @@ def helps(command: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
         yield from helps((*command, name))
 
 
-def _api(root: Path, package: str) -> str:
-    modules = sorted((root / package).rglob("*.py"))
-    if package != MIXTURE:
-        modules = [path for path in modules if not path.is_relative_to(root / MIXTURE)]
-    return f"# {_dotted(root, root / package)}\n" + "".join(_entry(root, path) for path in modules)
+def _api(root: Path, shown: Path) -> str:
+    """Its modules one after the other, without those of packages that have a page of their own."""
+    elsewhere = [root / path for path in API.values() if (root / path).is_relative_to(shown) and root / path != shown]
+    modules = sorted(shown.rglob("*.py")) or [shown]
+    kept = [path for path in modules if not any(path.is_relative_to(other) for other in elsewhere)]
+    return "".join(_entry(root, path, level=1 if path == kept[0] else 2) for path in kept)
 
 
-def _entry(root: Path, path: Path) -> str:
-    if path.name != "__init__.py":
-        return f"\n::: {_dotted(root, path)}\n"
+def _entry(root: Path, path: Path, level: int) -> str:
+    is_package = path.name == "__init__.py"
+    name = ".".join((path.parent if is_package else path).relative_to(root / "src").with_suffix("").parts)
+    options = f"::: {name}\n    options:\n      heading_level: {level}\n"
     # what a package offers is shown where it is defined
-    return f"\n::: {_dotted(root, path.parent)}\n    options:\n      members: false\n"
-
-
-def _dotted(root: Path, path: Path) -> str:
-    return ".".join(path.relative_to(root / "src").with_suffix("").parts)
+    return options + ("      members: false\n\n" if is_package else "\n")
