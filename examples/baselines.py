@@ -1,5 +1,5 @@
-"""A learner that is not ours, on a task that nobody tells it: soft actor-critic of stable-baselines3 on a point mass
-whose observation has the frozen module's belief beside it.
+"""A learner that is not ours, on tasks that nobody tells it: soft actor-critic of stable-baselines3
+on a point mass whose observation has the frozen module's belief beside it.
 
     pip install stable-baselines3        (the extra `sb3`)
     python examples/baselines.py

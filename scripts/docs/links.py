@@ -1,17 +1,19 @@
 """Links that hold in the repository, made to hold on the site.
 
-    [changelog](../CHANGELOG.md)                                a page of the site
-    [`Encoder.step`](../src/rebody/inference/encoder.py)        the API reference of what is named
-    [`rebody.inference`](../src/rebody/inference)               that package's page
-    [believing.py](../examples/believing.py)                    alone on a line: the script itself
+[changelog](../CHANGELOG.md)                                a page of the site
+[`Encoder.step`](../src/rebody/inference/encoder.py)        the API reference of what is named
+[`rebody.inference`](../src/rebody/inference)               that package's page
+[believing.py](../examples/believing.py)                    alone on a line: the script itself
 """
 
 import posixpath
 import re
 from pathlib import Path
 
-from reference import BESIDE
+from reference import BESIDE, EXAMPLES
 
+PAGES = BESIDE | {path: path for path in EXAMPLES} | {"README.md": "index.md"}
+"""Where on the site things outside docs/ are."""
 LINK = re.compile(r"\[(?P<text>[^\]]*)\]\((?P<path>[^)#:\s]+)(?P<anchor>#[^)\s]*)?\)")
 SCRIPT = re.compile(r"^\[[^\]]*\]\(\.\./(examples/\S+\.py)\)$", re.MULTILINE)
 
@@ -33,13 +35,11 @@ def symbol(text: str, path: str) -> str:
 def _on_site(link: re.Match, folder: str) -> str:
     text, anchor = link["text"], link["anchor"] or ""
     path = posixpath.normpath(posixpath.join(folder, link["path"]))
-    if path in BESIDE:
-        return f"[{text}]({BESIDE[path]}{anchor})"
     if path.startswith("src/rebody/"):
         return f"[{text}][{symbol(text, path)}]"
     if path.startswith("docs/"):
         return f"[{text}]({path.removeprefix('docs/')}{anchor})"
-    return link[0]  # leads nowhere: MkDocs says so
+    return f"[{text}]({PAGES[path]}{anchor})" if path in PAGES else link[0]  # what leads nowhere MkDocs complains of
 
 
 def _shown(root: Path, path: str) -> str:

@@ -4,7 +4,7 @@ import re
 
 from mkdocs.exceptions import PluginError
 
-FETCHED = re.compile(r'<(?:script|img|iframe|source|video)\b[^>]*\bsrc="(?:https?:)?//[^"]*|<link\b[^>]*\bhref="(?:https?:)?//[^"]*')
+FETCHED = re.compile(r'<(?:(?:script|img|iframe|source|video)\b[^>]*\bsrc|link\b[^>]*\bhref)="(?:https?:)?//[^"]*')
 
 
 def on_post_page(output, page, **_):

@@ -15,10 +15,11 @@ from rebody.cli.main import parse
 BESIDE = {
     "CHANGELOG.md": "changelog.md",
     "CONTRIBUTING.md": "contributing.md",
-    "README.md": "index.md",
     "benchmarks/README.md": "benchmarks.md",
 }
 """Pages of the repository outside docs/, and where they are on the site."""
+EXAMPLES = ("examples/ant/ant.toml", "examples/logs/cheetah.csv", "examples/logs/record.py")
+"""Files that the site has as they are."""
 API = {
     f"api/{path.removesuffix('.py').replace('/', '.')}.md": f"src/rebody/{path}"
     for path in (
@@ -36,8 +37,9 @@ def on_files(files, config):
     """Hook of MkDocs: add the pages that docs/ does not have."""
     root = Path(config.config_file_path).parent
     for path, uri in BESIDE.items():
-        if uri not in files.src_uris:
-            files.append(File.generated(config, uri, content=(root / path).read_text()))
+        files.append(File.generated(config, uri, content=(root / path).read_text()))
+    for path in EXAMPLES:
+        files.append(File(path, str(root), config.site_dir, config.use_directory_urls))
     for uri, path in API.items():
         files.append(File.generated(config, uri, content=_api(root, root / path)))
     return files
