@@ -1,4 +1,4 @@
-"""Equations as MathML, which browsers draw by themselves. In a page they are `$$...$$`, which repositories show, too."""
+"""Equations as MathML, which browsers draw by themselves; in a page `$$...$$`, which repositories show, too."""
 
 import html
 import re
