@@ -25,4 +25,5 @@ assert pathlib.Path(rebody.__file__).is_relative_to(sys.prefix), rebody.__file__
 assert pathlib.Path(rebody.__file__).with_name("py.typed").is_file()
 '
 venv/bin/rebody list
+venv/bin/rebody report position # its template is data of the package
 echo "the wheel works"

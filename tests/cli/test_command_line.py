@@ -82,7 +82,7 @@ def test_run_draws_an_episode(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (["run", "--task", "goal=1", "--seconds", "1"], "too short"),
         (["run", "--task", "velocity=1", "--inference", "position"], "cannot infer 'velocity'"),
         (["run", "--task", "goal=1", "--robot", "point-mass", "--agent", "flat"], "a point mass is none"),
-        (["run", "--task", "goal=1", "--agent", "oracle", "--thesis"], "thesis mode is for the agents reuse, readout"),
+        (["run", "--task", "goal=1", "--agent", "oracle", "--thesis"], "thesis mode is for the agents reuse, retrain"),
         (["run", "--task", "goal=1", "--agent", "flat", "--flat", "tracker-cheetah"], "'flat' is needed"),
         (["train", "flat", "--robot", "cheetah", "--inference", "positoin", "--out", "x"], "mean 'position'?"),
         (["figure", "6.33"], "there is no figure '6.33'. Did you mean 6.3? Figures are: 6.1, 6.2, 6.3"),

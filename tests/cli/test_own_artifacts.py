@@ -270,7 +270,7 @@ def test_a_diagnosis_and_own_artifacts_are_reported(trained, tasks, tmp_path, ca
     runs = [str(trained["inference"]), str(trained["tracker"]), str(out), str(out / "reuse.json")]
     assert run(["report", *runs, "--out", str(page)]) == 0
     assert f"written: {page}" in capsys.readouterr().out
-    for words in ("Learning curves", "return that it costs", "--updates 2", "clusters against base tasks"):
+    for words in ("Learning curves", "return that it costs", "Low-level policy of", "clusters against base tasks"):
         assert words in page.read_text(), words
 
 

@@ -251,7 +251,7 @@ def test_a_step_predictor_that_does_not_fit_is_refused(trial, predicting):
     told = predicting(3)
     for change, said in (
         ({"robot": "walker"}, "'tiny-predictor' was trained on 'walker', not on 'cheetah'"),
-        ({"tracker_hash": "0" * 64}, "knows how fast another tracker than 'tiny-tracker' is"),
+        ({"tracker_hash": "0" * 64}, "was trained with another tracker than 'tiny-tracker'"),
     ):
         with pytest.raises(RebodyError, match=said):
             evaluate(replace(told, step_predictor=replace(told.step_predictor, **change)), SPECS, 1)
@@ -285,7 +285,7 @@ REFUSED = {
     "agent 'flat' learned on a robot, and a point mass is none": lambda trial: (
         replace(trial, agent="flat", robot=None), SPECS,
     ),
-    "thesis mode is for the agents reuse, readout, bayes, not for 'oracle'": lambda trial: (
+    "thesis mode is for the agents reuse, retrain, readout, bayes, not for 'oracle'": lambda trial: (
         replace(trial, agent="oracle", thesis=True), SPECS,
     ),
     "thesis mode is for the agents .*not for 'flat'": lambda trial: (

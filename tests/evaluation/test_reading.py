@@ -12,8 +12,9 @@ from rebody.evaluation.reading import holds_results
 @pytest.fixture
 def results(result):
     switched = result(switch={"at_s": 1.0, "family": "goal", "target": 3.0}, subgoal=[None] * 30, oracle_return=None)
-    episodes = [result(), switched]
-    return Results("cheetah", "reuse", "tiny", None, 0.05, "predicted", 15, True, {"module": "12ab"}, episodes)
+    return Results(
+        "cheetah", "reuse", "tiny", None, 0.05, "predicted", 15, True, {"module": "12ab"}, [result(), switched]
+    )
 
 
 @pytest.fixture

@@ -14,10 +14,15 @@ BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 COMMANDS = re.findall(r"^    \.venv/bin/rebody (.*)$", PAGE, re.MULTILINE)
 
 
-@pytest.mark.parametrize("block", BLOCKS, ids=["live", "environment"])
-def test_python(block, capsys):
+@pytest.mark.parametrize(
+    ("block", "said"),
+    list(zip(BLOCKS, (r"^goal [56]\.\d+ ", r"^\(29,\) (goal|velocity)$"), strict=True)),
+    ids=["live", "environment"],
+)
+def test_python(block, said, capsys):
+    """Twenty decisions say what is asked; after the one of the second block either family is a fair guess."""
     exec(block, {})
-    assert "goal" in capsys.readouterr().out
+    assert re.search(said, capsys.readouterr().out)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -51,6 +51,12 @@ def test_shipped_names(shipped):
     assert load_artifact("tracker-cheetah", "tracker").name == "tracker-cheetah"
 
 
+def test_of_any_kind(shipped, folder):
+    assert [load_artifact(each).kind for each in ("tracker-cheetah", folder)] == ["tracker", "inference"]
+    with pytest.raises(RebodyError, match=r"Shipped artifacts: goal-velocity, mine, tracker-cheetah\."):
+        load_artifact("nowhere")
+
+
 def test_unknown_name_suggests_and_lists_its_kind(shipped):
     with pytest.raises(RebodyError, match=r"mean 'goal-velocity'\?") as error:
         load_artifact("goal-velocty", "inference")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rebody.errors import RebodyError
-from rebody.store import checkpoint, load_checkpoint, save_checkpoint, tree_hash
+from rebody.store import checkpoint, load_checkpoint, read_meta, save_checkpoint, tree_hash
 
 META = {"step": 3, "best": float("-inf"), "name": "run"}
 
@@ -33,6 +33,11 @@ def test_round_trip(folder):
     assert meta == META | {"step": 4}
     assert tree_hash(restored) == tree_hash(state(2.0))
     assert [entry.name for entry in folder.iterdir()] == [checkpoint.FILE]
+
+
+def test_what_lies_beside_the_state_is_read_alone(folder, tmp_path):
+    assert read_meta(folder) == META
+    assert read_meta(tmp_path / "nowhere") is None
 
 
 def test_restored_state_can_be_written_to_without_touching_the_file(folder):

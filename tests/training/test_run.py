@@ -18,7 +18,7 @@ import tensorboardX.proto.event_pb2
 from rich.markdown import Markdown
 
 from rebody.store import load_artifact, tree_hash
-from rebody.training.run import Run
+from rebody.training.run import Run, read_log
 
 LIVES = (0, 0, 1, 1, 1)
 """The turn in which each life of a killed run ends; at most eight turns are done by then."""
@@ -281,6 +281,9 @@ def test_a_log_has_a_row_per_iteration_and_a_column_per_name(tmp_path):
     assert run.log == "iteration\n"
     run.history = [{"loss": 0.5}, {"loss": 1234567.0, "evaluation/p95, m": -1.0}, {"entropy": 1e-9}]
     assert run.log == 'iteration,loss,"evaluation/p95, m",entropy\n1,0.5,,\n2,1.23457e+06,-1,\n3,,,1e-09\n'
+    columns = read_log(run.log)
+    np.testing.assert_array_equal(columns["iteration"], [1, 2, 3])
+    np.testing.assert_array_equal(columns["evaluation/p95, m"], [np.nan, -1, np.nan])
 
 
 def test_the_card_says_how_it_was_made(pipeline, tmp_path, monkeypatch, capsys):

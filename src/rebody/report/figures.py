@@ -130,8 +130,8 @@ def _errors(axes: Axes, agents: dict[str, list[EpisodeResult]], family: str) -> 
 def draw_errors(axes: Axes, episodes: list[EpisodeResult], **style: Any) -> None:
     """Which share of episodes has at most which final error; a millimetre stands for anything below it."""
     errors = np.sort([max(episode.final_error, 1e-3) for episode in episodes])
-    share = np.arange(1, len(errors) + 1) / len(errors)
-    axes.step(errors, 100 * share, where="post", **style)
+    share = np.arange(len(errors) + 1) / len(errors)
+    axes.step([errors[0], *errors], 100 * share, where="post", **style)
     axes.set(xscale="log")
 
 

@@ -146,9 +146,9 @@ def _draw(each: Panel, log: Log, axes: Axes) -> None:
             style = "o-" if there.mean() < SPARSE else "-"
             points = log["iteration"][there], log[column][there]
             axes.plot(*points, style, ms=3.5, lw=1.3, color=next(colours), label=label)
-    axes.set(title=each.title, xlabel="iteration", ylabel=each.axis, yscale=each.scale, ylim=each.limits)
-    if len(axes.lines) > 1:
-        axes.legend(frameon=False, fontsize=8)
+    axes.set(title=each.title, xlabel="iteration", xlim=(0, 1.02 * log["iteration"][-1]))
+    axes.set(ylabel=each.axis, yscale=each.scale, ylim=each.limits)
+    axes.legend(frameon=False, fontsize=8)
 
 
 def _measured(log: Log, column: str) -> bool:

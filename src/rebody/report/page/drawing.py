@@ -18,7 +18,7 @@ COLOURS = {TRUTH: "truth", BELIEF: "belief", MOTION: "motion", ORACLE: "oracle",
 CURVES = (MOTION, BELIEF, IDLE, ORACLE, TRUTH)
 """Colours of lines that stand for nothing else."""
 SIZE = (4.8, 3.4)
-ON_PAGE = {
+ON_PAGE: dict[Any, Any] = {
     "svg.fonttype": "none",  # letters stay letters
     "svg.hashsalt": "rebody",  # the same figure, the same ids
     "savefig.transparent": True,

@@ -52,4 +52,4 @@ def _errors(family: Family, compared: Mapping[str, Results], axes: Axes) -> None
         if episodes := compared[name].of(family.name):
             draw_errors(axes, episodes, color=colour, ls=line)
     axes.set(title=f"{family.name}: final errors", xlabel=f"final error [{family.unit}]")
-    axes.set(ylabel="episodes with at most this error [%]")
+    axes.set(ylabel="episodes with at most this error [%]", ylim=(0, 103))

@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rebody.evaluation.results import EpisodeResult, Results
+from rebody.tasks import FAMILIES, family_index
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,8 @@ def from_terminal(table: Table, header: Sequence[str] | None = None) -> PageTabl
 
 def episodes_table(results: Results) -> PageTable:
     """A row per episode: the task, what was believed of it in the end, and how it went."""
-    header = [
-        "hidden task", "seed", "read from the belief", "final error", "ripple [m/s]", "return", "oracle's return",
-        "fell",
-    ]  # fmt: skip
-    return PageTable("", header, [_row(episode) for episode in results.episodes])
+    header = ("hidden task", "seed", "belief", "final error", "ripple [m/s]", "return", "oracle's return", "fell")
+    return PageTable("", list(header), [_row(episode) for episode in results.episodes])
 
 
 def _row(episode: EpisodeResult) -> list[str]:
@@ -44,11 +42,11 @@ def _row(episode: EpisodeResult) -> list[str]:
         _task(episode),
         str(episode.seed),
         f"{episode.inferred_family[-1]} {episode.inferred_target[-1]:+.3f}",
-        f"{episode.final_error:.3f}",
+        f"{episode.final_error:.3f} {FAMILIES[family_index(episode.active_family[-1])].unit}",
         f"{episode.ripple_m_s:.3f}",
         f"{episode.return_:.2f}",
         "-" if episode.oracle_return is None else f"{episode.oracle_return:.2f}",
-        "fell" if episode.fell else "",
+        "yes" if episode.fell else "no",
     ]
 
 
