@@ -3,8 +3,10 @@ PYTHON ?= $(shell for python in python3.13 python3.12 python3.11 python3; do \
 	$$python -c 'import ensurepip, sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null \
 	&& echo $$python && break; done)
 BIN := .venv/bin
+# warnings are errors (mkdocs.yml); the variable silences an advertisement for the theme's successor
+MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
-.PHONY: demo test check clean
+.PHONY: demo test check docs clean
 
 demo: .venv/.runtime
 	$(BIN)/rebody demo
@@ -18,9 +20,13 @@ check: .venv/.installed
 	$(BIN)/ruff format --check
 	$(BIN)/pyright
 	$(BIN)/lint-imports
+	$(MKDOCS) --site-dir build/site
+
+docs: .venv/.installed
+	$(MKDOCS)
 
 clean:
-	rm -rf .venv build dist src/*.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv build dist site src/*.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 
 .venv/.runtime: pyproject.toml constraints.txt | $(BIN)/python
 	$(BIN)/pip install --quiet --editable . --constraint constraints.txt

@@ -1,5 +1,5 @@
-"""A cheetah whose hidden task changes while it runs. The agent is told neither the tasks nor that they change: all it
-hears is how it is paid.
+"""A cheetah whose hidden task changes while it runs. The agent is told neither the tasks nor that
+they change: all it hears is how it is paid.
 
     python examples/driving.py
 """
@@ -16,7 +16,7 @@ CONTROL_DT = 0.05  # s
 
 
 def drive(tasks: Sequence[tuple[str, float]] = TASKS, seconds: float = 8.0) -> Iterator[tuple]:
-    """Every second of every task: time [s], the task, what is believed, where the robot is [m], and how fast [m/s]."""
+    """Every second: time [s], the task, what is believed, where the robot is [m] and how fast [m/s]."""
     env = gymnasium.make("rebody/HalfCheetah-v0")
     agent = rebody.load_agent(robot="cheetah", inference="goal-velocity")
     observation, info = env.reset(seed=0)
@@ -33,7 +33,5 @@ def drive(tasks: Sequence[tuple[str, float]] = TASKS, seconds: float = 8.0) -> I
 
 if __name__ == "__main__":
     for time, (family, target), (believed, amount), x, vx in drive():
-        print(
-            f"{time:4.0f} s  hidden: {family:8} {target:5.1f}   believed: {believed:8} {amount:5.2f}"
-            f"   at {x:5.2f} m, {vx:5.2f} m/s"
-        )
+        tasks = f"hidden: {family:8} {target:5.1f}   believed: {believed:8} {amount:5.2f}"
+        print(f"{time:4.0f} s   {tasks}   at {x:5.2f} m, {vx:5.2f} m/s")
