@@ -121,6 +121,14 @@ def test_episodes_start_anywhere_at_any_speed(config, state):
     assert abs(np.corrcoef(started.x[:, 0], started.vx[:, 0])[0, 1]) < 0.2
 
 
+def test_disturbed_episodes_may_start_farther_out(config, state):
+    wide = replace(config, episodes=400, decisions=1, start=(5.0, 2.0), disturbed_start=(20.0, 1.0))
+    started = collect(state.module, state.sac.actor, TOY, wide, roles(400, True), jax.random.key(2)).state
+    for half, limits in ((slice(0, 200), (5.0, 2.0)), (slice(200, 400), (20.0, 1.0))):
+        for begun, limit in zip((started.x[half, 0], started.vx[half, 0]), limits, strict=True):
+            assert 0.95 * limit < np.abs(begun).max() <= limit
+
+
 def test_nothing_is_believed_before_the_first_transition(episodes):
     assert not np.asarray(episodes.belief.mean)[:, 0].any()
     assert (np.asarray(episodes.belief.variance)[:, 0] == 1).all()

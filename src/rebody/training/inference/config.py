@@ -69,6 +69,8 @@ class MetaConfig:
     """Variance of the noise on every observed field (thesis, captions of 6.20)."""
     start: tuple[float, float] = (12.0, 3.0)
     """Episodes start at uniformly random x [m] and vx [m/s] within these, a full toy at any pitch that it can hold."""
+    disturbed_start: tuple[float, float] | None = None
+    """The same for disturbed episodes, which teach inference alone; by default as the others."""
     turn_probability: float = 0.15
     """Chance per decision that a wandering toy changes its mind. It must come to see goals from both sides: while it
     stays on one, a belief in their mirror image explains all that it hears."""

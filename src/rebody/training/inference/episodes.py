@@ -105,10 +105,12 @@ def refresh_beliefs(encoder: Encoder, episodes: Episodes) -> Episodes:
 def _random_start(toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> ToyState:
     """Anywhere, at any speed, so that the latent cannot take the start for the task."""
     where_key, disturbance_key = jax.random.split(key)
-    reach = jnp.asarray([*config.start, toy.max_pitch])[:, None]
-    x, vx, pitch = jax.random.uniform(where_key, (3, config.episodes), minval=-1.0) * reach
     shape = (config.episodes,)
     nominal = jnp.arange(config.episodes) < config.episodes // 2
+    near, far = (
+        jnp.asarray([*start, toy.max_pitch])[:, None] for start in (config.start, config.disturbed_start or config.start)
+    )
+    x, vx, pitch = jax.random.uniform(where_key, (3, *shape), minval=-1.0) * jnp.where(nominal, near, far)
     disturbance = jax.tree.map(
         lambda calm, rough: jnp.where(nominal, calm, rough),
         no_disturbance(shape),

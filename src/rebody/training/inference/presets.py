@@ -77,6 +77,7 @@ def goal_velocity() -> MetaConfig:
         policy_fields=("vx",),
         policy_scales=(3.0,),
         start=(15.0, 3.0),
+        disturbed_start=(30.0, 3.0),
         turn_probability=0.08,
         switch_share=0.5,
         episodes=96,
@@ -95,6 +96,7 @@ def goal_velocity_thesis() -> MetaConfig:
         tasks=TaskDistribution((*_both_ways("goal", 1.0, 25.0), *_both_ways("velocity", 0.5, 3.0))),
         inference=replace(base.inference, scales=(17.0, 3.0)),
         start=(25.0, 3.0),
+        disturbed_start=(50.0, 3.0),
     )
 
 
@@ -123,6 +125,7 @@ def goal_velocity_stand() -> MetaConfig:
         inference=replace(base.inference, fields=("x", "vx", "pitch"), scales=(10.0, 3.0, 1.5), latent=9, kinds=3),
         policy_fields=("vx", "pitch", "pitch_rate"),
         policy_scales=(3.0, 1.5, 3.0),
+        disturbed_start=None,
         joint_iterations=95,
         sac=replace(base.sac, decay_updates=61_000),
     )
