@@ -195,7 +195,7 @@ def test_a_missing_extra_is_said(monkeypatch, capsys, package):
         (["--task", "velocity=1", "--inference", "position"], "cannot infer 'velocity'"),
         (["--robot", "cheeta"], "did you mean 'cheetah'"),
         (["--agent", "magic"], "Agents are: reuse"),
-        (["--robot", "point-mass", "--agent", "flat"], "moves the joints of a robot"),
+        (["--robot", "point-mass", "--agent", "flat"], "learned on a robot, and a point mass is none"),
     ],
 )
 def test_what_cannot_be_shown_first_is_said_before_there_is_a_page(arguments, says, capsys):

@@ -107,9 +107,8 @@ def _random_start(toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> ToyState:
     where_key, disturbance_key = jax.random.split(key)
     shape = (config.episodes,)
     nominal = jnp.arange(config.episodes) < config.episodes // 2
-    near, far = (
-        jnp.asarray([*start, toy.max_pitch])[:, None] for start in (config.start, config.disturbed_start or config.start)
-    )
+    starts = config.start, config.disturbed_start or config.start
+    near, far = (jnp.asarray([*start, toy.max_pitch])[:, None] for start in starts)
     x, vx, pitch = jax.random.uniform(where_key, (3, *shape), minval=-1.0) * jnp.where(nominal, near, far)
     disturbance = jax.tree.map(
         lambda calm, rough: jnp.where(nominal, calm, rough),
