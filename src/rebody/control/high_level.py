@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from rebody.control.sac import Actor
+from rebody.control.sac import Actor, SACConfig
 from rebody.tasks.families import FAMILIES
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
@@ -14,6 +14,18 @@ Places = tuple[tuple[str, float], ...]
 """Fields that a belief says the places of, and what both are divided by."""
 FARTHEST = 2.0
 """A place is seen as this far ahead at most, in units of its scale: one farther off asks for nothing else."""
+
+
+def high_level_sac(projections: int, decay_updates: int) -> SACConfig:
+    """How high-level policies learn, on the toy and on a robot: small networks that look 2 s ahead."""
+    return SACConfig(
+        hidden=(128, 128),
+        projections=projections,
+        discount=0.95,
+        learning_rate=5e-4,
+        decay_updates=decay_updates,
+        huber=0.05,
+    )
 
 
 @dataclass(frozen=True)

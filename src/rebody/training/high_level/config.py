@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from rebody.control.high_level import high_level_sac
 from rebody.control.sac import SACConfig
 
 
@@ -27,14 +28,5 @@ class HighLevelConfig:
     """Half of it is added at r = -arrival_width."""
     fall: float = 5.0
     """Taken from the reward of a decision in which the robot fell."""
-    sac: SACConfig = field(
-        default_factory=lambda: SACConfig(
-            hidden=(128, 128),
-            projections=16,
-            discount=0.95,
-            learning_rate=5e-4,
-            decay_updates=80_000,
-            huber=0.05,
-        )
-    )
+    sac: SACConfig = field(default_factory=lambda: high_level_sac(projections=16, decay_updates=80_000))
     """Hyperparameters of soft actor-critic."""

@@ -20,6 +20,7 @@ from rebody.bodies import RobotBatch, RobotSpec, load_robot
 from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.slot_policy import SlotPolicy, Slots, draw, judge, slots_within, subgoal_of
+from rebody.training.arrival import arrival_bonus
 from rebody.training.high_level.config import HighLevelConfig
 from rebody.training.high_level.report import measure, save_high_level
 from rebody.training.minds import Minds, listen, new_minds, put_on_feet
@@ -156,8 +157,8 @@ def shaped(
     earned: Float[np.ndarray, "*robot"], fell: Bool[np.ndarray, "*robot"], config: HighLevelConfig
 ) -> Float[np.ndarray, "*robot"]:
     """The task's scaled reward, a pull on arrival that is a function of it, a price for a fall."""
-    arrival = config.arrival * config.arrival_width / (config.arrival_width - earned)
-    return (earned + arrival - config.fall * fell).astype(np.float32)
+    arrival = arrival_bonus(earned, config.arrival, config.arrival_width)
+    return np.asarray(earned + arrival - config.fall * fell, np.float32)
 
 
 def observe(minds: Minds, module: Inference) -> Float[AnyArray, "robot feature"]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from math import pi
 
 from rebody.bodies.toys import Randomisation
-from rebody.control.sac import SACConfig
+from rebody.control.high_level import high_level_sac
 from rebody.inference import InferenceConfig
 from rebody.tasks import BaseTask, TaskDistribution
 from rebody.training.inference.config import MetaConfig
@@ -20,14 +20,7 @@ def position() -> MetaConfig:
         tasks=TaskDistribution((BaseTask("goal", 0.0, 10.0), BaseTask("goal", -10.0, 0.0))),
         reward="plain",
         inference=InferenceConfig(fields=("x",), scales=(10.0,), reward_scale=10.0, latent=2),
-        sac=SACConfig(
-            hidden=(128, 128),
-            projections=8,
-            discount=0.95,
-            learning_rate=5e-4,
-            decay_updates=65_000,
-            huber=0.05,
-        ),
+        sac=high_level_sac(projections=8, decay_updates=65_000),
         arrival=0.05,
         policy_fields=("x", "vx"),
         policy_scales=(10.0, 3.5),
@@ -63,14 +56,7 @@ def goal_velocity() -> MetaConfig:
         tasks=TaskDistribution((*_both_ways("goal", 2.0, 15.0), *_both_ways("velocity", 1.0, 3.0))),
         reward="relative",
         inference=InferenceConfig(fields=("x", "vx"), scales=(10.0, 3.0), reward_scale=1.0, latent=6, kinds=2),
-        sac=SACConfig(
-            hidden=(128, 128),
-            projections=16,
-            discount=0.95,
-            learning_rate=5e-4,
-            decay_updates=80_000,
-            huber=0.05,
-        ),
+        sac=high_level_sac(projections=16, decay_updates=80_000),
         prior="mixture",
         arrival=0.05,
         arrival_width=0.02,

@@ -25,6 +25,7 @@ from rebody.inference.module import Evidence, InferenceModule, loss
 from rebody.inference.prior import Prior, SplitPrior, unit_gaussian
 from rebody.inference.probe import Probe
 from rebody.tasks import base_task
+from rebody.training.arrival import arrival_bonus
 from rebody.training.inference.clusters import refit
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, collect, refresh_beliefs, roles
@@ -264,9 +265,7 @@ def sample_transitions(replay: Episodes, stored, config: MetaConfig, view: Polic
 
 
 def _shaped(reward: Float[Array, " batch"], config: MetaConfig) -> Float[Array, " batch"]:
-    return reward / config.inference.reward_scale + config.arrival * config.arrival_width / (
-        config.arrival_width - reward
-    )
+    return reward / config.inference.reward_scale + arrival_bonus(reward, config.arrival, config.arrival_width)
 
 
 def _optimiser(config: MetaConfig) -> optax.GradientTransformation:
