@@ -33,7 +33,7 @@ def _zero_shot(number: str, robot: str) -> ThesisFigure:
         number,
         f"goals and speeds on the {robot}, zero-shot",
         shipped(number),
-        lambda _: zero_shot.on_robot(robot),
+        lambda _: zero_shot.with_latents(robot),
         zero_shot.draw_robot,
         f"`goal-velocity`, frozen, on the {robot} that took no part in its training, from x = 0 at rest. Left: goals, "
         "middle: speeds; dotted: what was hidden. Right: latents from the 20th decision on, in the plane of the two "
@@ -151,6 +151,15 @@ FIGURES = {
             several.draw_projections,
             "Latents of `goal-velocity` from the 20th decision on, 12 tasks of each base task. Left: t-SNE, as in the "
             "thesis. Right: the two main components (PCA), where distances mean something.",
+        ),
+        ThesisFigure(
+            "6.15",
+            "goals and speeds on the cheetah, by what disturbed the toy in training",
+            shipped("6.15"),
+            lambda _: zero_shot.randomised(),
+            zero_shot.draw_randomised,
+            "Four modules, frozen, on the cheetah from x = 0 at rest. They differ in what disturbed half of their "
+            "training episodes on the toy. Left: goals, right: speeds; dotted: what was hidden.",
         ),
         _zero_shot("6.16", "cheetah"),
         _zero_shot("6.17", "walker"),

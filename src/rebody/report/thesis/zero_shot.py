@@ -1,4 +1,4 @@
-"""Section 6.4.3 of the thesis: the module for goals and speeds on robots that it has never seen."""
+"""Section 6.4.3 of the thesis: modules for goals and speeds on robots that they have never seen."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from rebody.agents.parts import load_inference, load_slots_of, load_tracker
 from rebody.bodies import load_robot
 from rebody.evaluation.evaluate import Trial
 from rebody.report.style import figure
-from rebody.report.thesis.data import Data, trajectories
+from rebody.report.thesis.data import Data, join, split, trajectories
 from rebody.report.thesis.panels import caption
 from rebody.report.thesis.several_families import (
     in_plane,
@@ -19,23 +19,52 @@ from rebody.report.thesis.several_families import (
 
 MODULE = "goal-velocity"
 DRAWN = ("time_s", "position_m", "velocity_m_s", "family", "target")
+RANDOMISED = {
+    "goal-velocity-noise-0": "nothing disturbed",
+    "goal-velocity-noise-0.1": "observation noise of variance 0.1",
+    "goal-velocity-noise-0.2": "observation noise of variance 0.2",
+    "goal-velocity": "ripple, lag and gain",
+}
+"""Modules that differ in what disturbed half of their training episodes."""
+
+
+# 6.15
+
+
+def randomised() -> Data:
+    """Each of those modules on the cheetah."""
+    return join({name: _drawn(on_robot(name, "cheetah")) for name in RANDOMISED})
+
+
+def draw_randomised(data: Data, path: Path, text: str) -> None:
+    """A row per module."""
+    with figure(path, len(RANDOMISED), 2, size=(10.5, 15.0)) as (drawing, panels):
+        rows = zip(RANDOMISED.items(), panels[::2], panels[1::2], strict=True)
+        for (name, disturbed), positions, velocities in rows:
+            ways_panels(positions, velocities, split(data, name))
+            positions.set_title(f"{name}: {disturbed}", fontsize=9, loc="left")
+        caption(drawing, text)
 
 
 # 6.16 to 6.18
 
 
-def on_robot(robot: str) -> Data:
+def with_latents(robot: str) -> Data:
     """`goal-velocity` on a robot, and its latents there and on the toy in the plane of the toy's main components."""
     from sklearn.decomposition import PCA  # a second to import, which every command would wait for
 
-    module, spec = load_inference(MODULE), load_robot(robot)
-    trial = Trial("reuse", module, spec, load_tracker(f"tracker-{robot}"), slots=load_slots_of(module, None))
-    episodes = trajectories(trial, tasks_of_each_kind(spec.reach.speed))
+    episodes = on_robot(MODULE, robot)
     plane, on_the_toy = PCA(2), late_latents(on_toy())
-    return {name: episodes[name] for name in DRAWN} | {
-        "toy_pca": in_plane(on_the_toy, plane.fit_transform),
-        "pca": in_plane(late_latents(episodes), plane.transform),
-    }
+    latents = in_plane(late_latents(episodes), plane.fit(on_the_toy.reshape(-1, on_the_toy.shape[-1])).transform)
+    toy_latents = in_plane(on_the_toy, plane.transform)
+    return _drawn(episodes) | {"toy_pca": toy_latents, "pca": latents}
+
+
+def on_robot(module: str, robot: str) -> Data:
+    """A module with the toy's policy on a robot, on tasks of each kind that the robot is fast enough for."""
+    inference, spec = load_inference(module), load_robot(robot)
+    trial = Trial("reuse", inference, spec, load_tracker(f"tracker-{robot}"), slots=load_slots_of(inference, None))
+    return trajectories(trial, tasks_of_each_kind(spec.reach.speed))
 
 
 def draw_robot(data: Data, path: Path, text: str) -> None:
@@ -46,3 +75,7 @@ def draw_robot(data: Data, path: Path, text: str) -> None:
         points_panel(latents, data["pca"], data)
         latents.legend(frameon=False, fontsize=8, markerscale=2)
         caption(drawing, text)
+
+
+def _drawn(episodes: Data) -> Data:
+    return {name: episodes[name] for name in DRAWN}
