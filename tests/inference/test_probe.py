@@ -38,3 +38,12 @@ def test_tells_families_apart_and_reads_each_by_its_own_map():
     probabilities = np.asarray(probe.probabilities(belief(latent[300:])))
     np.testing.assert_allclose(probabilities.sum(axis=-1), 1.0, atol=1e-5)
     np.testing.assert_array_equal(probe.families[probabilities.argmax(axis=-1)], families)
+
+
+def test_a_sign_is_as_sure_as_the_belief():
+    """target = 2 z + 1 is positive with a chance of Phi((2 m + 1) / (2 s)), where z has mean m and deviation s."""
+    z = np.linspace(-3.0, 3.0, 50)[:, None]
+    probe = fit_probe(z, np.full(50, GOAL), 2 * z[:, 0] + 1)
+    mean, std = np.array([-0.5, 0.5, 0.5, -2.0]), np.array([1.0, 1.0, 0.1, 0.1])
+    [front] = np.asarray(probe.chances_of_front(Belief(mean[:, None], std[:, None] ** 2))).T
+    np.testing.assert_allclose(front, [0.5, 0.8413, 1.0, 0.0], atol=1e-3)

@@ -27,8 +27,8 @@ def run_of(fields, families, latent=3, clusters=0):
         mean = np.sin(0.1 * i * np.arange(1, latent + 1))
         shares = {k: float(k == 0) for k in range(clusters)}
         believed = families[i * len(families) // TIME]
-        probabilities = {family: float(family == believed) for family in families}
-        return Reading(believed, 2.0, probabilities, shares, Belief(mean, np.ones(latent)))
+        base_tasks = {(family, sign): 0.5 * (family == believed) for family in families for sign in (1, -1)}
+        return Reading(believed, 2.0, base_tasks, shares, Belief(mean, np.ones(latent)))
 
     decisions = Decisions(time, {field: np.sin(time) for field in fields}, -np.ones(TIME))
     return BeliefOverTime("tiny", decisions, [reading(i) for i in range(TIME)])
@@ -54,6 +54,6 @@ def test_drawn_whole(run, tmp_path):
 def test_a_family_that_was_never_believed(tmp_path):
     run = run_of(("x", "vx"), ["goal", "velocity"])
     for i, reading in enumerate(run.readings):
-        run.readings[i] = Reading("goal", 2.0, reading.probabilities, {}, reading.latent)
+        run.readings[i] = Reading("goal", 2.0, reading.base_tasks, {}, reading.latent)
     plot_beliefs(run, tmp_path / "belief.png")
     assert_drawn(tmp_path / "belief.png")

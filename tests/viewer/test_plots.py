@@ -16,8 +16,8 @@ LENGTH = round(REMEMBERED_S / 0.1)
 
 def moment(i: int, hidden: TaskSpec, believed: str) -> Moment:
     latent = Belief(np.zeros(2), np.ones(2))
-    probabilities = {"goal": 0.8, "velocity": 0.2} if believed == "goal" else {"goal": 0.3, "velocity": 0.7}
-    reading = Reading(believed, 10.0 + i, probabilities, {}, latent)
+    base_tasks = {("goal", 1): 0.7, ("goal", -1): 0.3} if believed == "goal" else {("goal", 1): 0.2, ("goal", -1): 0.8}
+    reading = Reading(believed, 10.0 + i, base_tasks, {}, latent)
     return Moment(0.1 * (i + 1), hidden, {"goal": 1.0 * i, "velocity": 2.0 * i, "stand": 0.0}, -1.0, reading, None)
 
 
@@ -36,9 +36,9 @@ def test_targets_are_shown_in_the_unit_of_one_family():
 
 
 def test_probabilities_have_a_line_each():
-    _, goal, velocity = probability_series(MOMENTS, ["goal", "velocity"])
-    np.testing.assert_array_equal(goal[:4], [0.3, 0.8, 0.8, 0.3])
-    np.testing.assert_allclose(goal[:4] + velocity[:4], 1.0)
+    _, ahead, behind = probability_series(MOMENTS, [("goal", 1), ("goal", -1)])
+    np.testing.assert_array_equal(ahead[:4], [0.2, 0.7, 0.7, 0.2])
+    np.testing.assert_allclose(ahead[:4] + behind[:4], 1.0)
 
 
 def test_before_anything_happened_the_axes_are_there():

@@ -78,7 +78,7 @@ def test_every_agent_can_be_watched_and_the_module_listens(trial, agent):
     decide(session, 2)
     moment = session.moments[-1]
     assert moment.reading.latent.mean.shape == (2,)
-    assert moment.reading.probabilities == {"goal": 1.0}
+    assert moment.reading.probabilities == pytest.approx({"goal": 1.0})
     assert (moment.subgoal is None) == (agent == "flat")
 
 

@@ -28,12 +28,18 @@ class Reading:
     """The likeliest."""
     target: float
     """In the family's unit (m, m/s, rad)."""
-    probabilities: dict[str, float]
-    """Of each family that the module knows."""
+    base_tasks: dict[tuple[str, int], float]
+    """Probability of each base task that the module knows: a family, and 1 or -1 for its target's sign."""
     responsibilities: dict[int, float]
     """Of each of the mixture's clusters; empty where there is no mixture."""
     latent: Belief
     """Mean and variance; shapes [latent]."""
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """Of each family."""
+        families = dict.fromkeys(family for family, _ in self.base_tasks)
+        return {family: sum(self.base_tasks[family, sign] for sign in (1, -1)) for family in families}
 
 
 class LiveBelief:
@@ -66,13 +72,18 @@ class LiveBelief:
         return self._reading
 
     def _read(self, belief: Belief) -> Reading:
-        family, target, probabilities, shares = jax.tree.map(np.asarray, _read(self._probe, self._mixture, belief))
+        read = jax.tree.map(np.asarray, _read(self._probe, self._mixture, belief))
+        family, target, probabilities, front, shares = read
         names = [FAMILIES[i].name for i in np.asarray(self._probe.families)]
         clusters = [] if self._mixture is None else np.flatnonzero(self._mixture.active)
         return Reading(
             family=FAMILIES[int(family)].name,
             target=float(target),
-            probabilities=dict(zip(names, probabilities.tolist(), strict=True)),
+            base_tasks={
+                (name, sign): float(share * (ahead if sign > 0 else 1 - ahead))
+                for name, share, ahead in zip(names, probabilities, front, strict=True)
+                for sign in (1, -1)
+            },
             responsibilities={int(k): float(shares[k]) for k in clusters},
             latent=jax.tree.map(np.asarray, belief),
         )
@@ -114,6 +125,6 @@ def _take_in(encoder: Encoder, memory: EncoderCarry, transition: Transition) -> 
 @eqx.filter_jit
 def _read(
     probe: Probe, mixture: MixturePrior | None, belief: Belief
-) -> tuple[Int[Array, ""], Float[Array, ""], Float[Array, " family"], Float[AnyArray, " K"]]:
+) -> tuple[Int[Array, ""], Float[Array, ""], Float[Array, " family"], Float[Array, " family"], Float[AnyArray, " K"]]:
     shares = jnp.zeros(0) if mixture is None else mixture.shares(belief.mean)
-    return *probe(belief), probe.probabilities(belief), shares
+    return *probe(belief), probe.probabilities(belief), probe.chances_of_front(belief), shares

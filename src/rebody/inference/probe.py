@@ -31,6 +31,12 @@ class Probe(eqx.Module):
         """Of each family, in the order of `families`."""
         return jax.nn.softmax(self._logits(belief), axis=-1)
 
+    def chances_of_front(self, belief: Belief) -> Float[Array, "*batch family"]:
+        """Of each family, were it the one: how likely its target is positive, as sure as the belief is."""
+        mean = _with_one(jnp, belief.mean) @ self.target_weights
+        variance = belief.variance @ self.target_weights[:-1] ** 2
+        return jax.scipy.stats.norm.cdf(mean / jnp.sqrt(variance))
+
     def _logits(self, belief: Belief) -> Float[Array, "*batch family"]:
         return _with_one(jnp, belief.mean) @ self.family_weights
 

@@ -1,4 +1,4 @@
-"""The plots over time: target against reached value, and the probabilities of the families."""
+"""The plots over time: target against reached value, and the probabilities of the base tasks."""
 
 from collections.abc import Sequence
 
@@ -18,6 +18,8 @@ REACHED_PX, PROBABILITY_PX, PADDING = 135, 88, (6, 12, 0, 0)
 GOAL_NAME = FAMILIES[GOAL].name
 QUANTITIES = {"goal": "position x [m]", "velocity": "velocity [m/s]", "stand": "pitch [rad]"}
 """By family: what it is about."""
+BEHIND = (3, 3)
+"""Dashes of a line that is about negative targets [pixels]."""
 LOOSE: uplot.Series = {"auto": False}
 """Has no say in where its axis ends."""
 
@@ -44,9 +46,9 @@ def limits(values: Sequence[Float[np.ndarray, " time"]], family: str) -> tuple[f
     return low - margin, high + margin
 
 
-def probability_series(moments: Sequence[Moment], families: Sequence[str]) -> Series:
-    """Time [s], and the probability of each family."""
-    return _on_one_axis(moments, [[m.reading.probabilities[family] for m in moments] for family in families])
+def probability_series(moments: Sequence[Moment], base_tasks: Sequence[tuple[str, int]]) -> Series:
+    """Time [s], and the probability of each base task."""
+    return _on_one_axis(moments, [[m.reading.base_tasks[each] for m in moments] for each in base_tasks])
 
 
 def _on_one_axis(moments: Sequence[Moment], values: list[list[float]]) -> Series:
@@ -88,16 +90,22 @@ class ReachedPlot:
 
 
 class ProbabilityPlot:
-    """How sure the module is of the family."""
+    """How sure the module is of the base task: of the family, and whether its target is ahead of zero or behind."""
 
     def __init__(self, gui: viser.GuiApi, families: Sequence[str]):
-        self._families = families
+        self._base_tasks = [(family, sign) for family in families for sign in (1, -1)]
         lines: list[uplot.Series] = [
-            {"label": family, "stroke": colours.FAMILIES[family], "width": 2, "points": {"show": False}}
-            for family in families
+            {
+                "label": f"{family} {'+' if sign > 0 else '-'}",
+                "stroke": colours.FAMILIES[family],
+                "width": 2,
+                "dash": () if sign > 0 else BEHIND,
+                "points": {"show": False},
+            }
+            for family, sign in self._base_tasks
         ]
         self._plot = gui.add_uplot(
-            data=probability_series([], families),
+            data=probability_series([], self._base_tasks),
             series=({}, *lines),
             scales={"x": {"time": False}, "y": {"range": (-0.05, 1.05)}},
             axes=_axes("probability"),
@@ -108,7 +116,7 @@ class ProbabilityPlot:
 
     def show(self, moments: Sequence[Moment]) -> None:
         """The last seconds."""
-        self._plot.data = probability_series(moments, self._families)
+        self._plot.data = probability_series(moments, self._base_tasks)
 
     def remove(self) -> None:
         """Another module may know other families."""

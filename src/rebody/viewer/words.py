@@ -32,7 +32,8 @@ a guess.
 
 **Blue: the robot**, what it reaches.
 
-**Probability.** Which kind of task the module believes in.
+**Probability.** Which base task the module believes in: a kind, and whether its target is positive (solid) or negative
+(dashed).
 
 **Latent.** Each dot is a belief, ten per second, in the colour of the believed kind; the red ellipse is the newest
 one's uncertainty. Grey ellipses are clusters that the module found on the point mass, without labels. All ellipses
@@ -70,7 +71,7 @@ def _line(html_text: str) -> str:
 def family_legend(families: Sequence[str]) -> str:
     """Which line is which, as HTML."""
     names = " &nbsp; ".join(dot(colours.FAMILIES[family]) + family for family in families)
-    return _line(f"Kind of task: {names}")
+    return _line(f"Kind of task: {names} &nbsp; (dashed: negative)")
 
 
 def numbers(task: TaskSpec, moment: Moment | None) -> str:
