@@ -10,7 +10,7 @@ from PIL import Image
 
 from rebody.cli.main import run
 from rebody.errors import RebodyError
-from rebody.report.thesis import FIGURES, data, find_figures, make_figure
+from rebody.report.thesis import FIGURES, data, find_figures, make_figure, zero_shot
 from rebody.report.thesis import first_experiment as first
 from rebody.report.thesis import several_families as several
 from rebody.report.thesis.data import join, on_goals, save, split, training_log, trajectories
@@ -63,6 +63,8 @@ SYNTHETIC = {
     "6.7": curves_of(*(f"evaluation/{slot} {of}" for slot in ("goal", "velocity") for of in ("median", "p95"))),
     "6.8": episodes_of(1, targets=(3.0,), decision_s=0.05),  # a single goal
     "6.9": join(STRIDES | {"ours": episodes_of(2)}),
+    **dict.fromkeys(("6.10", "6.11"), join({"thesis": episodes_of(1), "ours": episodes_of(2)})),
+    "6.12": join({robot: curves_of("reward", "falls_per_minute", measured_every=1) for robot in ("hopper", "walker")}),
     "6.13": curves_of(
         "return", "evaluation/return", "evaluation/oracle return", "evaluation/goal median",
         "evaluation/velocity median", "mixture/components", "mixture/births", "mixture/merges", "mixture/purity",
@@ -70,6 +72,7 @@ SYNTHETIC = {
     ),
     "6.14a": several_of(several.EPISODES),
     "6.14b": several_of(),
+    "6.15": join({name: several_of(several.EPISODES) for name in zero_shot.RANDOMISED}),
     **dict.fromkeys(("6.16", "6.17", "6.18"), ON_ROBOT),
 }  # fmt: skip
 

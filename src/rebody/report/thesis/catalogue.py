@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rebody.errors import RebodyError
+from rebody.report.thesis import balancing, zero_shot
 from rebody.report.thesis import first_experiment as first
 from rebody.report.thesis import several_families as several
-from rebody.report.thesis import zero_shot
 from rebody.report.thesis.data import Data, save, shipped
 
 
@@ -26,6 +26,19 @@ class ThesisFigure:
     """Draws a log into a PNG with a caption."""
     caption: str
     """What is seen."""
+
+
+def _positions(number: str, robot: str) -> ThesisFigure:
+    return ThesisFigure(
+        number,
+        f"hidden positions on the {robot}",
+        shipped(number),
+        lambda _: balancing.positions_on(robot),
+        balancing.draw_both,
+        f"12 hidden goals in [0, 10] m on the {robot}, modules frozen. Above: `position-thesis` in thesis mode with a "
+        "stride of 5 control steps (0.1 s), as in the thesis. Below: `position`, the toy imagined 15 decisions ahead. "
+        "Left: the way (dots: goals), middle: the latent, right: the latent over the goal.",
+    )
 
 
 def _zero_shot(number: str, robot: str) -> ThesisFigure:
@@ -123,6 +136,17 @@ FIGURES = {
             " slower by as much. Right: our mode, `position` with a decision every 0.1 s and the toy imagined 15 "
             "decisions ahead.",
         ),
+        _positions("6.10", "hopper"),
+        _positions("6.11", "walker"),
+        ThesisFigure(
+            "6.12",
+            "trackers of robots that have to balance: training",
+            balancing.tracker_logs,
+            balancing.train_trackers_again,
+            balancing.draw_trackers,
+            "Learning `tracker-hopper` and `tracker-walker`, means over 30 iterations. Left: pay per control step while"
+            " they explore; the walker is told ever faster speeds over the first third. Right: how often they fall.",
+        ),
         ThesisFigure(
             "6.13",
             "return during training on goals and speeds",
@@ -158,7 +182,7 @@ FIGURES = {
             shipped("6.15"),
             lambda _: zero_shot.randomised(),
             zero_shot.draw_randomised,
-            "Four modules, frozen, on the cheetah from x = 0 at rest. They differ in what disturbed half of their "
+            "Three modules, frozen, on the cheetah from x = 0 at rest. They differ in what disturbed half of their "
             "training episodes on the toy. Left: goals, right: speeds; dotted: what was hidden.",
         ),
         _zero_shot("6.16", "cheetah"),

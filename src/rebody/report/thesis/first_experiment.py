@@ -20,6 +20,7 @@ from rebody.report.thesis.panels import (
     draw_latents_over_targets,
     draw_level,
     draw_positions,
+    smoothed,
 )
 from rebody.training.flat import FlatConfig, train_flat
 from rebody.training.inference import PRESETS, train_inference
@@ -31,7 +32,7 @@ SECONDS = {1: 40.0, 10: 80.0, 50: 350.0, 100: 700.0}
 """Long enough for each stride [control steps] to arrive: it makes at most 0.1 m at a time."""
 STRIDES = (10, 50, 100)
 EPISODE = 25
-"""Iterations that two episodes of the flat policy's training take."""
+"""Iterations that two episodes of the flat policy's training take; all its robots begin theirs at once."""
 
 
 # 6.1
@@ -111,7 +112,7 @@ def train_flat_again(runs: Path) -> Data:
 def draw_flat_training(data: Data, path: Path, text: str) -> None:
     """Reward while exploring, error on held-out tasks."""
     with figure(path, 1, 2, size=(10.0, 4.2)) as (drawing, (rewards, errors)):
-        draw_curve(rewards, _smoothed(data, "task_reward", EPISODE), "task_reward", "while exploring")
+        draw_curve(rewards, smoothed(data, "task_reward", EPISODE), "task_reward", "while exploring")
         draw_level(rewards, -5.0, "standing still")
         rewards.set(xlabel="control steps [million]", ylabel="reward per decision [m]")
         draw_curve(errors, data, "evaluation/median error", "median", dots=True)
@@ -121,13 +122,6 @@ def draw_flat_training(data: Data, path: Path, text: str) -> None:
         for axes in (rewards, errors):
             axes.legend(frameon=False, fontsize=8)
         caption(drawing, text)
-
-
-def _smoothed(data: Data, name: str, rows: int) -> Data:
-    """A column's mean over so many rows; all robots begin their episodes at once."""
-    rows = min(rows, len(data[name]))
-    mean = np.convolve(data[name], np.full(rows, 1 / rows), mode="valid")
-    return data | {name: mean, "steps": data["steps"][rows - 1 :]}
 
 
 def tracker_training_log() -> Data:

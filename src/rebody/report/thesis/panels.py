@@ -56,6 +56,13 @@ def draw_curve(axes: Axes, log: Data, name: str, label: str, *, colour: str = MO
     axes.plot(log["steps"][measured] / 1e6, log[name][measured], style, color=colour, ms=3.5, lw=1.3, label=label)
 
 
+def smoothed(log: Data, name: str, rows: int) -> Data:
+    """A training log with a column's mean over so many rows in its place."""
+    rows = min(rows, len(log[name]))
+    mean = np.convolve(log[name], np.full(rows, 1 / rows), mode="valid")
+    return log | {name: mean, "steps": log["steps"][rows - 1 :]}
+
+
 def draw_level(axes: Axes, value: float, label: str, colour: str = ORACLE) -> None:
     """A value to compare a curve with."""
     axes.axhline(value, color=colour, ls="--", lw=1.1, label=label)
