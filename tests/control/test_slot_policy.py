@@ -24,12 +24,12 @@ def test_the_largest_value_stays_with_its_sign():
     np.testing.assert_allclose(pool(VALUES), [[0, -0.4, 0], [-0.9, 0, 0], [0, 0, 0]])
 
 
-def test_a_value_asks_for_its_share_of_what_the_robot_reaches():
+def test_a_value_asks_for_the_share_of_what_the_robot_reaches_that_is_its_square():
     """A goal lies that far ahead of where the robot is."""
     x = np.array([10.0, 10.0, 10.0], np.float32)
     subgoal = subgoal_of(pool(VALUES), at(x), SLOTS)
     np.testing.assert_array_equal(subgoal.slot, [VELOCITY, GOAL, GOAL])
-    np.testing.assert_allclose(subgoal.value, [-0.8, 10 - 4.5, 10.0], rtol=1e-6)
+    np.testing.assert_allclose(subgoal.value, [-0.16 * 2, 10 - 0.81 * 5, 10.0], rtol=1e-6)
 
 
 @pytest.mark.parametrize("families", [(GOAL,), (GOAL, VELOCITY), (GOAL, VELOCITY, STAND)])

@@ -61,10 +61,14 @@ def judge(
 
 
 def subgoal_of(pooled: Float[AnyArray, "*batch slot"], state: GlobalState, slots: Slots) -> Subgoal:
-    """What a pooled vector asks for in this state: a goal is a point in the world that far ahead."""
+    """What a pooled vector asks for in this state: a goal is a point in the world that far ahead.
+
+    It grows with the square of a value: a goal that is a hand's breadth ahead has a value that no other slot outdoes
+    by chance, so a robot that has arrived can stand.
+    """
     families, scales = map(jnp.asarray, zip(*slots, strict=True))
     family = families[jnp.argmax(jnp.abs(pooled), axis=-1)]
-    value = jnp.sum(pooled * scales, axis=-1)
+    value = jnp.sum(pooled * jnp.abs(pooled) * scales, axis=-1)
     return Subgoal(family, jnp.where(family == GOAL, state.x + value, value))
 
 

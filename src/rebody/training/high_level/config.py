@@ -16,7 +16,7 @@ class HighLevelConfig:
     """Decisions of each robot in an iteration."""
     updates: int = 512
     """Updates in an iteration."""
-    iterations: int = 160
+    iterations: int = 320
     """Length of the run."""
     replay: int = 300_000
     """Decisions kept."""
@@ -28,5 +28,5 @@ class HighLevelConfig:
     """Half of it is added at r = -arrival_width."""
     fall: float = 5.0
     """Taken from the reward of a decision in which the robot fell."""
-    sac: SACConfig = field(default_factory=lambda: high_level_sac(projections=16, decay_updates=80_000))
+    sac: SACConfig = field(default_factory=lambda: high_level_sac(projections=16, decay_updates=160_000))
     """Hyperparameters of soft actor-critic."""

@@ -1,0 +1,95 @@
+"""Ways to act on a robot, side by side: one table, one page (thesis 6.5.3).
+
+    .venv/bin/python benchmarks/comparison.py [--robots cheetah ...] [--inference goal-velocity ...] [--seeds 3]
+
+Every agent on the same hidden tasks of each robot. What has no artifact is left out, what was judged before is not
+judged again. The page, `comparison.html` in `--out`, has intervals, pictures and every episode.
+"""
+
+import argparse
+from pathlib import Path
+
+from rebody.cli.trial import TrialOptions
+from rebody.errors import RebodyError
+from rebody.evaluation import Results, evaluate, read_results, save_results
+from rebody.evaluation.evaluate import Trial
+from rebody.report.page import find, write_page
+from rebody.store import load_artifact
+from rebody.tasks.task_file import read_tasks
+
+TASKS = Path(__file__).parent / "tasks"
+AGENTS = ("oracle", "bayes", "readout", "reuse", "retrain", "flat", "idle")
+COLUMNS = (
+    "robot", "module", "agent", "goal: median error [m]", "velocity: median error [m/s]", "return",
+    "base task right [%]", "fell [%]", "robot steps [million]", "training [min]",
+)  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", nargs="*", default=["cheetah", "walker", "hopper"])
+    parser.add_argument("--inference", nargs="*", default=["goal-velocity"])
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--out", type=Path, default=Path("runs/comparison"))
+    arguments = parser.parse_args()
+    print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}")
+    for robot in arguments.robots:
+        for module in arguments.inference:
+            for agent in AGENTS:
+                compare(TrialOptions(robot=robot, inference=module, agent=agent), arguments.seeds, arguments.out)
+    page = arguments.out / "comparison.html"
+    write_page([find(str(arguments.out))], page)
+    print(f"\n{page}")
+
+
+def compare(options: TrialOptions, seeds: int, out: Path) -> None:
+    """Print a row, if there are the parts for it."""
+    try:
+        trial = options.load()
+        results = judge(trial, out / f"{options.robot}-{options.inference}-{options.agent}.json", seeds)
+    except RebodyError as error:
+        print(f"{options.robot}, {options.agent}: left out, {error}")
+        return
+    families, steps_and_minutes = results.summary["families"], costs(trial)
+    cells = [
+        options.robot,
+        options.inference,
+        options.agent,
+        *(interval(families[family]["median_error"]) for family in ("goal", "velocity")),
+        f"{sum(episode.return_ for episode in results.episodes) / len(results.episodes):.1f}",
+        f"{100 * min(families[family]['base_task_right']['value'] for family in families):.1f}",
+        f"{100 * results.summary['fell']['value']:.1f}",
+        *(f"{value:.1f}" for value in steps_and_minutes),
+    ]
+    print(f"| {' | '.join(cells)} |", flush=True)
+
+
+def judge(trial: Trial, path: Path, seeds: int) -> Results:
+    """Out of the file, or anew."""
+    if path.exists():
+        return read_results(path)
+    assert trial.robot is not None
+    results = evaluate(trial, read_tasks(TASKS / f"goal-velocity-{trial.robot.name}.json"), seeds)
+    save_results(results, path)
+    return results
+
+
+def costs(trial: Trial) -> tuple[float, float]:
+    """Control steps that the robot took for all that was trained on it [million], and how long that took [min]."""
+    assert trial.robot is not None
+    parts = {"tracker": None if trial.flat else trial.tracker, "high-level": trial.high_level, "flat": trial.flat}
+    steps = seconds = 0.0
+    for kind, part in ((kind, part) for kind, part in parts.items() if part):
+        training = load_artifact(part.name, kind).config["training"]
+        per_step = trial.robot.steps_per_decision if kind == "high-level" else 1
+        steps += training["robots"] * training["steps"] * training["iterations"] * per_step / 1e6
+        seconds += training["wall_s"]
+    return steps, seconds / 60
+
+
+def interval(figure: dict[str, float]) -> str:
+    return "{value:.3f} [{low:.3f}, {high:.3f}]".format(**figure)
+
+
+if __name__ == "__main__":
+    main()
