@@ -10,7 +10,7 @@ from PIL import Image
 
 from rebody.cli.main import run
 from rebody.errors import RebodyError
-from rebody.report.thesis import FIGURES, data, find_figures, make_figure, zero_shot
+from rebody.report.thesis import FIGURES, data, find_figures, make_figure, retrained, zero_shot
 from rebody.report.thesis import first_experiment as first
 from rebody.report.thesis import several_families as several
 from rebody.report.thesis.data import join, on_goals, save, split, training_log, trajectories
@@ -73,6 +73,11 @@ SYNTHETIC = {
     "6.14a": several_of(several.EPISODES),
     "6.14b": several_of(),
     "6.15": join({name: several_of(several.EPISODES) for name in zero_shot.RANDOMISED}),
+    "6.19": join({f"high-level-{m}-{robot}": curves_of("evaluation/return") for m, robot in retrained.POLICIES}),
+    **dict.fromkeys(
+        ("6.20", "6.21"),
+        join({f"high-level-{m}-{robot}": several_of(several.EPISODES) for m, robot in retrained.POLICIES}),
+    ),
     **dict.fromkeys(("6.16", "6.17", "6.18"), ON_ROBOT),
 }  # fmt: skip
 

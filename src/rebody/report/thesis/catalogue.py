@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rebody.errors import RebodyError
-from rebody.report.thesis import balancing, zero_shot
+from rebody.report.thesis import balancing, retrained, zero_shot
 from rebody.report.thesis import first_experiment as first
 from rebody.report.thesis import several_families as several
 from rebody.report.thesis.data import Data, save, shipped
@@ -182,12 +182,40 @@ FIGURES = {
             shipped("6.15"),
             lambda _: zero_shot.randomised(),
             zero_shot.draw_randomised,
-            "Three modules, frozen, on the cheetah from x = 0 at rest. They differ in what disturbed half of their "
-            "training episodes on the toy. Left: goals, right: speeds; dotted: what was hidden.",
+            "Three modules, frozen, on the cheetah from x = 0 at rest. They differ in what disturbed the toy in "
+            "training (noise: always; ripple, lag and gain: in half of the episodes). Left: goals, right: speeds; "
+            "dotted: what was hidden.",
         ),
         _zero_shot("6.16", "cheetah"),
         _zero_shot("6.17", "walker"),
         _zero_shot("6.18", "hopper"),
+        ThesisFigure(
+            "6.19",
+            "high levels learned on robots: training",
+            retrained.training,
+            retrained.train_again,
+            retrained.draw_training,
+            "Learning a high-level policy on a robot, its tracker and the module frozen: return over 20 s on 100 "
+            "held-out goals and speeds.",
+        ),
+        ThesisFigure(
+            "6.20",
+            "high levels learned on the cheetah: goals and speeds",
+            shipped("6.20"),
+            lambda _: retrained.on_robots("cheetah"),
+            retrained.draw_ways,
+            "High-level policies that were learned on the cheetah, by module, from x = 0 at rest. Left: goals, right: "
+            "speeds; dotted: what was hidden.",
+        ),
+        ThesisFigure(
+            "6.21",
+            "a high level learned on the hopper: goals and speeds",
+            shipped("6.21"),
+            lambda _: retrained.on_robots("hopper"),
+            retrained.draw_ways,
+            "A high-level policy that was learned on the hopper, from x = 0 at rest. Left: goals, right: speeds; "
+            "dotted: what was hidden.",
+        ),
     )
 }
 

@@ -32,12 +32,12 @@ RANDOMISED = {
 
 def randomised() -> Data:
     """Each of those modules on the cheetah."""
-    return join({name: _drawn(on_robot(name, "cheetah")) for name in RANDOMISED})
+    return join({name: drawn(on_robot(name, "cheetah")) for name in RANDOMISED})
 
 
 def draw_randomised(data: Data, path: Path, text: str) -> None:
     """A row per module."""
-    with figure(path, len(RANDOMISED), 2, size=(10.5, 15.0)) as (drawing, panels):
+    with figure(path, len(RANDOMISED), 2, size=(10.5, 1.0 + 3.6 * len(RANDOMISED))) as (drawing, panels):
         rows = zip(RANDOMISED.items(), panels[::2], panels[1::2], strict=True)
         for (name, disturbed), positions, velocities in rows:
             ways_panels(positions, velocities, split(data, name))
@@ -56,7 +56,7 @@ def with_latents(robot: str) -> Data:
     plane, on_the_toy = PCA(2), late_latents(on_toy())
     latents = in_plane(late_latents(episodes), plane.fit(on_the_toy.reshape(-1, on_the_toy.shape[-1])).transform)
     toy_latents = in_plane(on_the_toy, plane.transform)
-    return _drawn(episodes) | {"toy_pca": toy_latents, "pca": latents}
+    return drawn(episodes) | {"toy_pca": toy_latents, "pca": latents}
 
 
 def on_robot(module: str, robot: str) -> Data:
@@ -76,5 +76,6 @@ def draw_robot(data: Data, path: Path, text: str) -> None:
         caption(drawing, text)
 
 
-def _drawn(episodes: Data) -> Data:
+def drawn(episodes: Data) -> Data:
+    """What the figures need of episodes."""
     return {name: episodes[name] for name in DRAWN}

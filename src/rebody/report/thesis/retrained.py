@@ -1,0 +1,77 @@
+"""Section 6.5.1 of the thesis: high-level policies that were learned on robots, with the frozen module."""
+
+from pathlib import Path
+
+from rebody.agents.parts import load_high_level, load_inference, load_tracker
+from rebody.bodies import load_robot
+from rebody.evaluation.evaluate import Trial
+from rebody.report.style import BELIEF, MOTION, ORACLE, figure
+from rebody.report.thesis.data import Data, join, split, training_log, trajectories
+from rebody.report.thesis.panels import caption, draw_curve
+from rebody.report.thesis.several_families import tasks_of_each_kind, ways_panels
+from rebody.report.thesis.zero_shot import drawn
+from rebody.training.high_level import HighLevelConfig, train_high_level
+
+POLICIES = {
+    ("goal-velocity", "cheetah"): MOTION,
+    ("goal-velocity-noise-0", "cheetah"): BELIEF,
+    ("goal-velocity", "hopper"): ORACLE,
+}
+"""Modules and robots of the policies that ship, and their colours."""
+
+
+# 6.19
+
+
+def training() -> Data:
+    """Of the shipped policies."""
+    return join({_name(*of): training_log(_name(*of), "high-level") for of in POLICIES})
+
+
+def train_again(runs: Path) -> Data:
+    """Of policies trained anew."""
+    logs = {}
+    for module, robot in POLICIES:
+        out = runs / _name(module, robot)
+        train_high_level(robot, module, None, HighLevelConfig(), out, 0, resume=True)
+        logs[_name(module, robot)] = training_log(out, "high-level")
+    return join(logs)
+
+
+def draw_training(data: Data, path: Path, text: str) -> None:
+    """Return of held-out tasks over decisions."""
+    with figure(path, 1, 1, size=(7.5, 4.4)) as (drawing, (axes,)):
+        for (module, robot), colour in POLICIES.items():
+            log = split(data, _name(module, robot))
+            draw_curve(axes, log, "evaluation/return", f"{robot}, {module}", colour=colour, dots=True)
+        axes.set(xlabel="decisions on the robot [million]", ylabel="return over 20 s")
+        axes.legend(frameon=False, fontsize=8)
+        caption(drawing, text)
+
+
+# 6.20, 6.21
+
+
+def on_robots(*robots: str) -> Data:
+    """Each policy that was learned on one of them, on tasks of each kind that the robot is fast enough for."""
+    return join({_name(module, robot): _on_robot(module, robot) for module, robot in POLICIES if robot in robots})
+
+
+def draw_ways(data: Data, path: Path, text: str) -> None:
+    """A row per policy: goals and speeds."""
+    shown = [(module, robot) for module, robot in POLICIES if f"{_name(module, robot)}/target" in data]
+    with figure(path, len(shown), 2, size=(10.5, 1.0 + 4.2 * len(shown))) as (drawing, panels):
+        for (module, robot), positions, velocities in zip(shown, panels[::2], panels[1::2], strict=True):
+            ways_panels(positions, velocities, split(data, _name(module, robot)))
+            positions.set_title(f"{robot}, {module}", fontsize=9, loc="left")
+        caption(drawing, text)
+
+
+def _on_robot(module: str, robot: str) -> Data:
+    spec, tracker, policy = load_robot(robot), load_tracker(f"tracker-{robot}"), load_high_level(_name(module, robot))
+    trial = Trial("retrain", load_inference(module), spec, tracker, high_level=policy)
+    return drawn(trajectories(trial, tasks_of_each_kind(spec.reach.speed)))
+
+
+def _name(module: str, robot: str) -> str:
+    return f"high-level-{module}-{robot}"
