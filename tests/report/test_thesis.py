@@ -74,10 +74,7 @@ SYNTHETIC = {
     "6.14b": several_of(),
     "6.15": join({name: several_of(several.EPISODES) for name in zero_shot.RANDOMISED}),
     "6.19": join({f"high-level-{m}-{robot}": curves_of("evaluation/return") for m, robot in retrained.POLICIES}),
-    **dict.fromkeys(
-        ("6.20", "6.21"),
-        join({f"high-level-{m}-{robot}": several_of(several.EPISODES) for m, robot in retrained.POLICIES}),
-    ),
+    "6.20": join({f"high-level-{m}-{robot}": several_of(several.EPISODES) for m, robot in retrained.POLICIES}),
     **dict.fromkeys(("6.16", "6.17", "6.18"), ON_ROBOT),
 }  # fmt: skip
 

@@ -191,30 +191,21 @@ FIGURES = {
         _zero_shot("6.18", "hopper"),
         ThesisFigure(
             "6.19",
-            "high levels learned on robots: training",
+            "high levels learned on the cheetah: training",
             retrained.training,
             retrained.train_again,
             retrained.draw_training,
-            "Learning a high-level policy on a robot, its tracker and the module frozen: return over 20 s on 100 "
+            "Learning a high-level policy on the cheetah, its tracker and the module frozen: return over 20 s on 100 "
             "held-out goals and speeds.",
         ),
         ThesisFigure(
             "6.20",
             "high levels learned on the cheetah: goals and speeds",
             shipped("6.20"),
-            lambda _: retrained.on_robots("cheetah"),
+            lambda _: retrained.on_robot("cheetah"),
             retrained.draw_ways,
             "High-level policies that were learned on the cheetah, by module, from x = 0 at rest. Left: goals, right: "
             "speeds; dotted: what was hidden.",
-        ),
-        ThesisFigure(
-            "6.21",
-            "a high level learned on the hopper: goals and speeds",
-            shipped("6.21"),
-            lambda _: retrained.on_robots("hopper"),
-            retrained.draw_ways,
-            "A high-level policy that was learned on the hopper, from x = 0 at rest. Left: goals, right: speeds; "
-            "dotted: what was hidden.",
         ),
     )
 }

@@ -5,7 +5,7 @@ from pathlib import Path
 from rebody.agents.parts import load_high_level, load_inference, load_tracker
 from rebody.bodies import load_robot
 from rebody.evaluation.evaluate import Trial
-from rebody.report.style import BELIEF, MOTION, ORACLE, figure
+from rebody.report.style import BELIEF, MOTION, figure
 from rebody.report.thesis.data import Data, join, split, training_log, trajectories
 from rebody.report.thesis.panels import caption, draw_curve
 from rebody.report.thesis.several_families import tasks_of_each_kind, ways_panels
@@ -15,7 +15,6 @@ from rebody.training.high_level import HighLevelConfig, train_high_level
 POLICIES = {
     ("goal-velocity", "cheetah"): MOTION,
     ("goal-velocity-noise-0", "cheetah"): BELIEF,
-    ("goal-velocity", "hopper"): ORACLE,
 }
 """Modules and robots of the policies that ship, and their colours."""
 
@@ -49,12 +48,12 @@ def draw_training(data: Data, path: Path, text: str) -> None:
         caption(drawing, text)
 
 
-# 6.20, 6.21
+# 6.20
 
 
-def on_robots(*robots: str) -> Data:
-    """Each policy that was learned on one of them, on tasks of each kind that the robot is fast enough for."""
-    return join({_name(module, robot): _on_robot(module, robot) for module, robot in POLICIES if robot in robots})
+def on_robot(robot: str) -> Data:
+    """Each policy that was learned on it, on tasks of each kind that it is fast enough for."""
+    return join({_name(module, on): _judged(module, on) for module, on in POLICIES if on == robot})
 
 
 def draw_ways(data: Data, path: Path, text: str) -> None:
@@ -67,7 +66,7 @@ def draw_ways(data: Data, path: Path, text: str) -> None:
         caption(drawing, text)
 
 
-def _on_robot(module: str, robot: str) -> Data:
+def _judged(module: str, robot: str) -> Data:
     spec, tracker, policy = load_robot(robot), load_tracker(f"tracker-{robot}"), load_high_level(_name(module, robot))
     trial = Trial("retrain", load_inference(module), spec, tracker, high_level=policy)
     return drawn(trajectories(trial, tasks_of_each_kind(spec.reach.speed)))
