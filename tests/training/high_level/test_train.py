@@ -113,7 +113,7 @@ def test_a_policy_sees_what_the_toys_policy_sees(begun, inference, frozen):
     np.testing.assert_allclose(observe(minds, inference), view(minds.state, interpret(minds.belief)), atol=1e-6)
     pooled = np.array([[0.5], [-0.5], [0.1]], np.float32)
     np.testing.assert_allclose(
-        subgoal_of(pooled, minds.state, frozen.slots).value, batch.x + 5 * pooled[:, 0], rtol=1e-4
+        subgoal_of(pooled, minds.state, frozen.slots).value, batch.x + 5 * (pooled * np.abs(pooled))[:, 0], rtol=1e-4
     )
 
 
