@@ -9,6 +9,7 @@ judged again. The page, `comparison.html` in `--out`, has intervals, pictures an
 import argparse
 from pathlib import Path
 
+from agents import cell
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, read_results, save_results
@@ -46,7 +47,7 @@ def compare(options: TrialOptions, seeds: int, out: Path) -> None:
     """Print a row, if there are the parts for it."""
     try:
         trial = options.load()
-        results = judge(trial, out / f"{options.robot}-{options.inference}-{options.agent}.json", seeds)
+        results = judge(trial, out / f"{options.robot}-{trial.inference.name}-{options.agent}.json", seeds)
     except RebodyError as error:
         print(f"{options.robot}, {options.agent}: left out, {error}")
         return
@@ -55,7 +56,7 @@ def compare(options: TrialOptions, seeds: int, out: Path) -> None:
         options.robot,
         options.inference,
         options.agent,
-        *(interval(families[family]["median_error"]) for family in ("goal", "velocity")),
+        *(cell(families[family]["median_error"]) for family in ("goal", "velocity")),
         f"{sum(episode.return_ for episode in results.episodes) / len(results.episodes):.1f}",
         f"{100 * min(families[family]['base_task_right']['value'] for family in families):.1f}",
         f"{100 * results.summary['fell']['value']:.1f}",
@@ -85,10 +86,6 @@ def costs(trial: Trial) -> tuple[float, float]:
         steps += training["robots"] * training["steps"] * training["iterations"] * per_step / 1e6
         seconds += training["wall_s"]
     return steps, seconds / 60
-
-
-def interval(figure: dict[str, float]) -> str:
-    return "{value:.3f} [{low:.3f}, {high:.3f}]".format(**figure)
 
 
 if __name__ == "__main__":

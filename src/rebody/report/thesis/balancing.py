@@ -6,8 +6,8 @@ from rebody.agents.parts import load_inference, load_tracker
 from rebody.bodies import load_robot
 from rebody.evaluation.evaluate import Trial
 from rebody.report.style import BELIEF, MOTION, figure
-from rebody.report.thesis.data import Data, join, on_goals, split, training_log
-from rebody.report.thesis.first_experiment import THESIS_GOALS
+from rebody.report.thesis.data import Data, join, on_goals, split
+from rebody.report.thesis.first_experiment import THESIS_GOALS, tracker_training_log, train_tracker_again
 from rebody.report.thesis.panels import (
     caption,
     draw_curve,
@@ -16,7 +16,6 @@ from rebody.report.thesis.panels import (
     draw_positions,
     smoothed,
 )
-from rebody.training.tracker import tracker_preset, train_tracker
 
 STRIDE = 5
 """Control steps of a decision in thesis mode: 0.1 s on these robots."""
@@ -54,17 +53,12 @@ def draw_both(data: Data, path: Path, text: str) -> None:
 
 def tracker_logs() -> Data:
     """Of the shipped trackers."""
-    return join({robot: training_log(f"tracker-{robot}", "tracker") for robot in TRACKERS})
+    return join({robot: tracker_training_log(robot) for robot in TRACKERS})
 
 
 def train_trackers_again(runs: Path) -> Data:
     """Of trackers trained anew by their presets."""
-    logs = {}
-    for robot in TRACKERS:
-        out = runs / f"tracker-{robot}"
-        train_tracker(robot, tracker_preset(load_robot(robot)), out, 0, resume=True)
-        logs[robot] = training_log(out, "tracker")
-    return join(logs)
+    return join({robot: train_tracker_again(robot, runs) for robot in TRACKERS})
 
 
 def draw_trackers(data: Data, path: Path, text: str) -> None:

@@ -109,8 +109,8 @@ FIGURES = {
         ThesisFigure(
             "6.7",
             "the cheetah's tracker: training",
-            first.tracker_training_log,
-            first.train_tracker_again,
+            lambda: first.tracker_training_log("cheetah"),
+            lambda runs: first.train_tracker_again("cheetah", runs),
             first.draw_tracker_training,
             "Learning `tracker-cheetah`: errors on 100 held-out goals within 5 m (left) and 100 held-out speeds "
             "of +-[1, 3] m/s (right), told to the tracker, at each dot.",
@@ -202,7 +202,7 @@ FIGURES = {
             "6.20",
             "high levels learned on the cheetah: goals and speeds",
             shipped("6.20"),
-            lambda _: retrained.on_robot("cheetah"),
+            lambda _: retrained.on_robots(),
             retrained.draw_ways,
             "High-level policies that were learned on the cheetah, by module, from x = 0 at rest. Left: goals, right: "
             "speeds; dotted: what was hidden.",

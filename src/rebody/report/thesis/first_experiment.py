@@ -124,15 +124,15 @@ def draw_flat_training(data: Data, path: Path, text: str) -> None:
         caption(drawing, text)
 
 
-def tracker_training_log() -> Data:
+def tracker_training_log(robot: str) -> Data:
     """Of the shipped tracker."""
-    return training_log("tracker-cheetah", "tracker")
+    return training_log(f"tracker-{robot}", "tracker")
 
 
-def train_tracker_again(runs: Path) -> Data:
-    """Of a tracker trained anew."""
-    out = runs / "tracker-cheetah"
-    train_tracker("cheetah", tracker_preset(load_robot("cheetah")), out, 0, resume=True)
+def train_tracker_again(robot: str, runs: Path) -> Data:
+    """Of a tracker trained anew, by its preset."""
+    out = runs / f"tracker-{robot}"
+    train_tracker(robot, tracker_preset(load_robot(robot)), out, 0, resume=True)
     return training_log(out, "tracker")
 
 

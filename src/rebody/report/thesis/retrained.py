@@ -8,7 +8,7 @@ from rebody.evaluation.evaluate import Trial
 from rebody.report.style import BELIEF, MOTION, figure
 from rebody.report.thesis.data import Data, join, split, training_log, trajectories
 from rebody.report.thesis.panels import caption, draw_curve
-from rebody.report.thesis.several_families import tasks_of_each_kind, ways_panels
+from rebody.report.thesis.several_families import draw_ways_of_each, tasks_of_each_kind
 from rebody.report.thesis.zero_shot import drawn
 from rebody.training.high_level import HighLevelConfig, train_high_level
 
@@ -51,19 +51,15 @@ def draw_training(data: Data, path: Path, text: str) -> None:
 # 6.20
 
 
-def on_robot(robot: str) -> Data:
-    """Each policy that was learned on it, on tasks of each kind that it is fast enough for."""
-    return join({_name(module, on): _judged(module, on) for module, on in POLICIES if on == robot})
+def on_robots() -> Data:
+    """Each policy on its robot, on tasks of each kind that it is fast enough for."""
+    return join({_name(module, robot): _judged(module, robot) for module, robot in POLICIES})
 
 
 def draw_ways(data: Data, path: Path, text: str) -> None:
     """A row per policy: goals and speeds."""
-    shown = [(module, robot) for module, robot in POLICIES if f"{_name(module, robot)}/target" in data]
-    with figure(path, len(shown), 2, size=(10.5, 1.0 + 4.2 * len(shown))) as (drawing, panels):
-        for (module, robot), positions, velocities in zip(shown, panels[::2], panels[1::2], strict=True):
-            ways_panels(positions, velocities, split(data, _name(module, robot)))
-            positions.set_title(f"{robot}, {module}", fontsize=9, loc="left")
-        caption(drawing, text)
+    titles = {_name(module, robot): f"{robot}, {module}" for module, robot in POLICIES}
+    draw_ways_of_each(data, titles, path, text)
 
 
 def _judged(module: str, robot: str) -> Data:

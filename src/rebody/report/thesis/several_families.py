@@ -1,6 +1,6 @@
 """Section 6.4.2 of the thesis: one module for goals and speeds, front and back."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from rebody.agents.parts import load_inference
 from rebody.evaluation.evaluate import Trial
 from rebody.report.style import BELIEF, MOTION, ORACLE, TRUTH, figure
-from rebody.report.thesis.data import Data, training_log, trajectories
+from rebody.report.thesis.data import Data, split, training_log, trajectories
 from rebody.report.thesis.panels import caption, draw_curve
 from rebody.tasks import GOAL, VELOCITY, base_task
 from rebody.tasks.task_file import TaskSpec
@@ -120,6 +120,16 @@ def draw_ways(data: Data, path: Path, text: str) -> None:
     """Positions on goals, velocities on speeds."""
     with figure(path, 1, 2, size=(10.5, 4.4)) as (drawing, (positions, velocities)):
         ways_panels(positions, velocities, data)
+        caption(drawing, text)
+
+
+def draw_ways_of_each(data: Data, titles: Mapping[str, str], path: Path, text: str) -> None:
+    """A row for each of several logs, under its title."""
+    rows = len(titles)
+    with figure(path, rows, 2, size=(10.5, 1.0 + 3.6 * rows)) as (drawing, panels):
+        for (part, title), positions, velocities in zip(titles.items(), panels[::2], panels[1::2], strict=True):
+            ways_panels(positions, velocities, split(data, part))
+            positions.set_title(title, fontsize=9, loc="left")
         caption(drawing, text)
 
 

@@ -6,9 +6,10 @@ from rebody.agents.parts import load_inference, load_slots_of, load_tracker
 from rebody.bodies import load_robot
 from rebody.evaluation.evaluate import Trial
 from rebody.report.style import figure
-from rebody.report.thesis.data import Data, join, split, trajectories
+from rebody.report.thesis.data import Data, join, trajectories
 from rebody.report.thesis.panels import caption
 from rebody.report.thesis.several_families import (
+    draw_ways_of_each,
     in_plane,
     late_latents,
     on_toy,
@@ -24,7 +25,7 @@ RANDOMISED = {
     "goal-velocity-noise-0.1": "observation noise of variance 0.1",
     "goal-velocity": "ripple, lag and gain",
 }
-"""Modules that differ in what disturbed half of their training episodes."""
+"""Modules that differ in what disturbed the toy in their training."""
 
 
 # 6.15
@@ -37,12 +38,7 @@ def randomised() -> Data:
 
 def draw_randomised(data: Data, path: Path, text: str) -> None:
     """A row per module."""
-    with figure(path, len(RANDOMISED), 2, size=(10.5, 1.0 + 3.6 * len(RANDOMISED))) as (drawing, panels):
-        rows = zip(RANDOMISED.items(), panels[::2], panels[1::2], strict=True)
-        for (name, disturbed), positions, velocities in rows:
-            ways_panels(positions, velocities, split(data, name))
-            positions.set_title(f"{name}: {disturbed}", fontsize=9, loc="left")
-        caption(drawing, text)
+    draw_ways_of_each(data, {name: f"{name}: {disturbed}" for name, disturbed in RANDOMISED.items()}, path, text)
 
 
 # 6.16 to 6.18
@@ -54,9 +50,10 @@ def with_latents(robot: str) -> Data:
 
     episodes = on_robot(MODULE, robot)
     plane, on_the_toy = PCA(2), late_latents(on_toy())
-    latents = in_plane(late_latents(episodes), plane.fit(on_the_toy.reshape(-1, on_the_toy.shape[-1])).transform)
-    toy_latents = in_plane(on_the_toy, plane.transform)
-    return drawn(episodes) | {"toy_pca": toy_latents, "pca": latents}
+    return drawn(episodes) | {
+        "toy_pca": in_plane(on_the_toy, plane.fit_transform),
+        "pca": in_plane(late_latents(episodes), plane.transform),
+    }
 
 
 def on_robot(module: str, robot: str) -> Data:
