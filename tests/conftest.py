@@ -40,6 +40,7 @@ from rebody.training.high_level import report as high_level_report  # noqa: E402
 from rebody.training.inference import measure as inference_measure  # noqa: E402
 from rebody.training.inference import report as inference_report  # noqa: E402
 from rebody.training.inference import train as inference_train  # noqa: E402
+from rebody.training.scratch import report as scratch_report  # noqa: E402
 from rebody.training.step_predictor import report as step_report  # noqa: E402
 from rebody.training.tracker import report as tracker_report  # noqa: E402
 
@@ -145,6 +146,11 @@ FLAGS = {
         train flat --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5
         --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
     """,
+    "scratch": """
+        train scratch --robot cheetah --robots 4 --decisions 6 --groups 2 --iterations 9
+        --inference-updates 2 --policy-updates 2 --inference.units 8 --inference.window 4 --inference.batch-size 4
+        --inference.decoded 2 --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
+    """,
     "high-level": """
         train high-level --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5
         --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
@@ -173,6 +179,8 @@ def in_short() -> Iterator[pytest.MonkeyPatch]:
         patched.setattr(inference_measure, "DECISIONS", 60)
         patched.setattr(flat_report, "TASKS", 3)
         patched.setattr(flat_report, "DECISIONS", 30)
+        patched.setattr(scratch_report, "TASKS", 4)
+        patched.setattr(scratch_report, "DECISIONS", 30)
         patched.setattr(high_level_report, "TASKS", 3)
         patched.setattr(high_level_report, "DECISIONS", 30)
         patched.setattr(step_report, "ROBOTS", 8)
@@ -227,6 +235,6 @@ def trained(own_module, tiny_training) -> dict[str, Path]:
     """Folders of a module, a tracker, the policies that hear that module, and that tracker's step predictor."""
     folders = {kind: own_module.with_name(kind) for kind in tiny_training}
     with in_short():
-        for kind in ("flat", "high-level", "step-predictor"):
+        for kind in ("flat", "scratch", "high-level", "step-predictor"):
             assert run([*tiny_training[kind], "--out", str(folders[kind])]) == 0
     return folders

@@ -14,10 +14,11 @@ from rebody.store import load_artifact, tree_hash
 from rebody.training.flat import train as flat_train
 from rebody.training.inference import train as inference_train
 from rebody.training.run import Run
+from rebody.training.scratch import train as scratch_train
 from rebody.training.step_predictor import train as step_train
 from rebody.training.tracker import train as tracker_train
 
-KINDS = ("tracker", "inference", "flat", "step-predictor")
+KINDS = ("tracker", "inference", "flat", "scratch", "step-predictor")
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def checkpoint(out: Path) -> dict:
 @pytest.fixture(scope="session")
 def pipelines(tiny_training) -> dict[str, Pipeline]:
     """All of them, by name."""
-    modules = (tracker_train, inference_train, flat_train, step_train)
+    modules = (tracker_train, inference_train, flat_train, scratch_train, step_train)
     return {kind: Pipeline(kind, tiny_training[kind], module) for kind, module in zip(KINDS, modules, strict=True)}
 
 

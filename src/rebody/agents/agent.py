@@ -43,7 +43,7 @@ class Inferrer(Protocol):
         """The belief before anything is seen."""
         ...
 
-    def step(self, memory: Any, transition: Transition) -> tuple[Any, Belief]:
+    def step(self, memory: Any, transition: Transition, /) -> tuple[Any, Belief]:
         """Take in a transition."""
         ...
 

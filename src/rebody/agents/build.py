@@ -9,9 +9,11 @@ from rebody.agents.parts import (
     Inference,
     LoadedFlat,
     LoadedHighLevel,
+    LoadedScratch,
     LoadedSlots,
     LoadedStepPredictor,
     LoadedTracker,
+    ScratchParts,
 )
 from rebody.agents.slots import OneSlot, SlotChooser, SlotOfCluster
 from rebody.bodies import RobotSpec
@@ -32,6 +34,7 @@ AGENTS = {
     "bayes": "the exact posterior in place of the module, its most probable target handed to the tracker",
     "oracle": "told the task",
     "flat": "the frozen module, and a policy without hierarchy that was learned on the robot",
+    "scratch": "module and policy that were learned on the robot together, nothing reused",
     "idle": "knows nothing and stands still",
 }
 """Every kind of agent, and what it is."""
@@ -45,7 +48,9 @@ def check_agent(kind: str) -> None:
         raise RebodyError(f"unknown agent '{kind}'. Agents are: {', '.join(AGENTS)}.")
 
 
-def check_robot_of(part: LoadedTracker | LoadedFlat | LoadedHighLevel | LoadedStepPredictor, spec: RobotSpec) -> None:
+def check_robot_of(
+    part: LoadedTracker | LoadedFlat | LoadedScratch | LoadedHighLevel | LoadedStepPredictor, spec: RobotSpec
+) -> None:
     """RebodyError if a policy was trained on another robot, or on another description of it."""
     if part.robot != spec.name:
         raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{spec.name}'.")
@@ -114,11 +119,13 @@ def build_agent(
     *,
     slots: SlotChooser | None = None,
     high_level: SlotPolicy | None = None,
+    scratch: ScratchParts | None = None,
     stride: int = 1,
     horizon: int = HORIZON,
 ) -> Agent:
-    """An agent of a named kind; `oracle` needs the tasks, the active ones [time, episode], `retrain` its policy, and
-    `reuse` on a robot what chooses its slots (a point mass has none: the module's first family stands for all).
+    """An agent of a named kind; `oracle` needs the tasks, the active ones [time, episode], `retrain` its policy,
+    `scratch` its own module, and `reuse` on a robot what chooses its slots (a point mass has none: the module's first
+    family stands for all).
 
     RebodyError if there is no such kind, or the module cannot serve it.
     """
@@ -145,5 +152,8 @@ def build_agent(
             return OracleAgent(**listens, **told, tasks=active)
         case "flat":
             return FlatAgent(**listens)
+        case "scratch":
+            assert scratch is not None
+            return FlatAgent(inferrer=scratch.module.encoder, reader=scratch.probe, stride=stride)
         case _:
             return IdleAgent(**listens, actions=inference.toy.actions)

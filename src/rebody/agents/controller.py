@@ -10,7 +10,9 @@ from jaxtyping import Float
 
 from rebody.bodies import RobotBatch
 from rebody.control.flat import FlatPolicy
+from rebody.control.scratch import ScratchPolicy
 from rebody.control.tracker import Command, Tracker, relative
+from rebody.inference.decoder import Decoder
 from rebody.tasks import GOAL
 from rebody.types import AnyArray, Belief, Subgoal
 
@@ -65,3 +67,19 @@ class FlatController(Controller):
         """There is no subgoal."""
         assert belief is not None
         return self.policy(joints, x, belief)
+
+
+class ScratchController(Controller):
+    """Follows the belief of the module that was learned with it."""
+
+    policy: ScratchPolicy
+    decoder: Decoder
+
+    def see(self, batch):
+        """The joint state."""
+        return batch.joint_state()
+
+    def __call__(self, joints, x, pitch, subgoal, belief):
+        """There is no subgoal."""
+        assert belief is not None
+        return self.policy(joints, x, self.decoder.interpret(belief))

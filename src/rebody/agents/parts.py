@@ -18,6 +18,7 @@ from rebody.bodies.toys import Toy, make_toy
 from rebody.control.flat import FlatPolicy
 from rebody.control.high_level import HighLevelPolicy, PolicyView, TaskCode
 from rebody.control.sac import Actor, SACConfig
+from rebody.control.scratch import ScratchPolicy
 from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import StepPredictor
 from rebody.control.tracker import Tracker
@@ -84,6 +85,24 @@ class LoadedFlat:
     inference_hash: str
     """Of the module's weights."""
     policy: FlatPolicy
+
+
+class ScratchParts(eqx.Module):
+    """What a scratch artifact holds: module, policy and probe, all learned on one robot."""
+
+    module: InferenceModule
+    policy: ScratchPolicy
+    probe: Probe
+
+
+@dataclass(frozen=True)
+class LoadedScratch:
+    """A loaded scratch artifact: it believes and acts by itself."""
+
+    name: str
+    robot: str
+    contract: Contract
+    parts: ScratchParts
 
 
 @dataclass(frozen=True)
@@ -155,12 +174,22 @@ def flat_template(config: dict[str, Any]) -> FlatPolicy:
     return FlatPolicy(_actor_template(config["observations"], config["actions"], config), config["reach"])
 
 
+def scratch_template(config: dict[str, Any]) -> ScratchParts:
+    """Parts of the right shapes, to be filled with weights."""
+    settings = InferenceConfig(**with_tuples(config["inference"]))
+    families = len(config["contract"]["target_ranges"])
+    weights = np.zeros((settings.latent + 1, families), np.float32)
+    return ScratchParts(
+        module=InferenceModule(settings, config["actions"], jax.random.key(0)),
+        policy=ScratchPolicy(_actor_template(config["observations"], config["actions"], config), settings.places),
+        probe=Probe(np.zeros(families, np.int32), weights, weights),
+    )
+
+
 def slot_policy_template(config: dict[str, Any]) -> SlotPolicy:
     """A high-level policy of a robot of the right shapes, to be filled with weights."""
-    seen = config["view"]
-    view = PolicyView(tuple(seen["fields"]), tuple(seen["scales"]), tuple(map(tuple, seen["places"])))
     slots = tuple((family_index(name), scale) for name, scale in config["slots"].items())
-    return SlotPolicy(_actor_template(config["observations"], len(slots), config), view, slots)
+    return SlotPolicy(_actor_template(config["observations"], len(slots), config), _view(config), slots)
 
 
 def step_predictor_template(config: dict[str, Any]) -> StepPredictor:
@@ -197,6 +226,14 @@ def load_flat(reference: str) -> LoadedFlat:
     with _understood(artifact):
         config = artifact.config
         return LoadedFlat(artifact.name, config["robot"], config["inference_hash"], _fill(flat_template, artifact))
+
+
+def load_scratch(reference: str) -> LoadedScratch:
+    """A shipped scratch artifact by name, or one in a folder; RebodyError if it cannot be read."""
+    artifact = load_artifact(reference, "scratch")
+    with _understood(artifact):
+        contract = Contract.from_config(artifact.config["contract"])
+        return LoadedScratch(artifact.name, artifact.config["robot"], contract, _fill(scratch_template, artifact))
 
 
 def load_high_level(reference: str) -> LoadedHighLevel:
@@ -260,6 +297,11 @@ def _understood(artifact: Artifact) -> Iterator[None]:
 
 def _policy_template(view: PolicyView, believed: int, actions: int, config: dict[str, Any]) -> HighLevelPolicy:
     return HighLevelPolicy(_actor_template(view.size(believed), actions, config), view)
+
+
+def _view(config: dict[str, Any]) -> PolicyView:
+    seen = config["view"]
+    return PolicyView(tuple(seen["fields"]), tuple(seen["scales"]), tuple(map(tuple, seen["places"])))
 
 
 def _actor_template(observations: int, actions: int, config: dict[str, Any]) -> Actor:

@@ -13,6 +13,7 @@ from rebody.training.classifier import ClassifierConfig, train_classifier
 from rebody.training.flat import FlatConfig, train_flat
 from rebody.training.high_level import HighLevelConfig, train_high_level
 from rebody.training.inference import PRESETS, MetaConfig, train_inference
+from rebody.training.scratch import ScratchConfig, train_scratch
 from rebody.training.step_predictor import StepPredictorConfig, train_step_predictor
 from rebody.training.tracker import TrackerConfig, tracker_preset, train_tracker
 
@@ -93,6 +94,25 @@ class TrainFlat:
             self.robot, self.inference, self.config, self.out, self.seed, resume=self.resume, init_from=self.init_from
         )
         _show_card(folder)
+
+
+@dataclass(frozen=True)
+class TrainScratch:
+    """Train inference module and joint policy together on a robot, nothing reused: what reuse is compared with."""
+
+    robot: str
+    """A robot's name (see `rebody list`), or the path of its TOML file."""
+    out: Path
+    """Folder of the run, and of the artifact that it becomes."""
+    seed: int = 0
+    """Seed of everything that is random."""
+    resume: bool = False
+    """Go on with the run in --out."""
+    config: Annotated[ScratchConfig, tyro.conf.arg(name="")] = field(default_factory=ScratchConfig)
+
+    def run(self) -> None:
+        """Train, save, say where."""
+        _show_card(train_scratch(self.robot, self.config, self.out, self.seed, resume=self.resume))
 
 
 @dataclass(frozen=True)
@@ -187,9 +207,10 @@ def train_command(arguments: list[str]) -> type:
     tracker: Any = Annotated[TrainTracker, tyro.conf.subcommand("tracker", default=on_robot, prefix_name=False)]
     classifier: Any = Annotated[TrainClassifier, tyro.conf.subcommand("classifier", prefix_name=False)]
     flat: Any = Annotated[TrainFlat, tyro.conf.subcommand("flat", prefix_name=False)]
+    scratch: Any = Annotated[TrainScratch, tyro.conf.subcommand("scratch", prefix_name=False)]
     high_level: Any = Annotated[TrainHighLevel, tyro.conf.subcommand("high-level", prefix_name=False)]
     step_predictor: Any = Annotated[TrainStepPredictor, tyro.conf.subcommand("step-predictor", prefix_name=False)]
-    parts = inference | tracker | classifier | high_level | flat | step_predictor
+    parts = inference | tracker | classifier | high_level | flat | scratch | step_predictor
     command: Any = Annotated[parts, tyro.conf.arg(name="")]
     doc = "Train a part; every shipped artifact is made by these commands."
     return make_dataclass("Train", [("command", command)], frozen=True, namespace={"run": _run, "__doc__": doc})

@@ -10,10 +10,12 @@ import tyro
 from rebody.agents.build import AGENTS, HORIZON, SlotsBy, check_agent
 from rebody.agents.parts import (
     LoadedHighLevel,
+    LoadedScratch,
     LoadedStepPredictor,
     load_flat,
     load_high_level,
     load_inference,
+    load_scratch,
     load_slots_of,
     load_step_predictor,
     load_tracker,
@@ -38,6 +40,8 @@ class TrialOptions:
     """Tracker artifact; default tracker-ROBOT."""
     flat: str | None = None
     """Policy of agent `flat`; default flat-ROBOT."""
+    scratch: str | None = None
+    """Artifact of agent `scratch`; default scratch-ROBOT."""
     high_level: str | None = None
     """Policy of agent `retrain`; default high-level-INFERENCE-ROBOT."""
     classifier: str | None = None
@@ -73,6 +77,9 @@ class TrialOptions:
             inference=inference,
             tracker=load_tracker(self.tracker or f"tracker-{robot.name}") if robot else None,
             flat=load_flat(self.flat or f"flat-{robot.name}") if robot and self.agent == "flat" else None,
+            scratch=load_scratch(self.scratch or f"scratch-{robot.name}")
+            if robot and self.agent == "scratch"
+            else None,
             high_level=self._high_level(robot),
             slots=load_slots_of(inference, self.classifier) if bridged else None,
             slots_by=self.slots_by,
@@ -92,6 +99,11 @@ class TrialOptions:
         if self.robot == POINT_MASS:
             raise RebodyError("--stride predicted counts control steps of a robot; a point mass has none.")
         return 1
+
+    def _scratch(self, robot: RobotSpec | None) -> LoadedScratch | None:
+        if robot is None or self.agent != "scratch":
+            return None
+        return load_scratch(self.scratch or f"scratch-{robot.name}")
 
     def _high_level(self, robot: RobotSpec | None) -> LoadedHighLevel | None:
         if robot is None or self.agent != "retrain":

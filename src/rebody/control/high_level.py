@@ -50,16 +50,21 @@ class PolicyView:
         if not self.places:
             return jnp.concatenate([here, belief.features()], axis=-1)
         names, units = zip(*self.places, strict=True)
-        share, place = jnp.split(belief.mean, 2, axis=-1)
-        _, doubt = jnp.split(belief.variance**0.5, 2, axis=-1)
-        ahead = jnp.clip(place - state.select(names) / jnp.asarray(units), -FARTHEST, FARTHEST)
-        # the likeliest field's place as it is: a share of 0.998 would put it 3 cm short of 15 m
-        gate = share / jnp.max(share, axis=-1, keepdims=True)
-        return jnp.concatenate([here, share, gate * ahead, gate * jnp.abs(place), gate * doubt], axis=-1)
+        return jnp.concatenate([here, seen_from(state.select(names) / jnp.asarray(units), belief)], axis=-1)
 
     def size(self, believed: int) -> int:
         """How many numbers it sees, with a belief of so many."""
         return len(self.fields) + (4 * len(self.places) if self.places else 2 * believed)
+
+
+def seen_from(here: Float[AnyArray, "*batch field"], understood: Belief) -> Float[AnyArray, "*batch four_times_field"]:
+    """The places that an interpreted belief speaks of, from where the body's scaled fields are."""
+    share, place = jnp.split(understood.mean, 2, axis=-1)
+    _, doubt = jnp.split(understood.variance**0.5, 2, axis=-1)
+    ahead = jnp.clip(place - here, -FARTHEST, FARTHEST)
+    # the likeliest field's place as it is: a share of 0.998 would put it 3 cm short of 15 m
+    gate = share / jnp.max(share, axis=-1, keepdims=True)
+    return jnp.concatenate([share, gate * ahead, gate * jnp.abs(place), gate * doubt], axis=-1)
 
 
 class HighLevelPolicy(eqx.Module):

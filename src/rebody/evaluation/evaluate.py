@@ -19,11 +19,12 @@ from rebody.agents.build import (
     slot_chooser,
 )
 from rebody.agents.clock import Clock, EvenClock, PredictedClock
-from rebody.agents.controller import Controller, FlatController, TrackerController
+from rebody.agents.controller import Controller, FlatController, ScratchController, TrackerController
 from rebody.agents.parts import (
     Inference,
     LoadedFlat,
     LoadedHighLevel,
+    LoadedScratch,
     LoadedSlots,
     LoadedStepPredictor,
     LoadedTracker,
@@ -34,13 +35,14 @@ from rebody.bodies.toys import Toy
 from rebody.control.tracker import slots_of
 from rebody.errors import RebodyError
 from rebody.evaluation.results import Results, episode_results
+from rebody.inference.contract import Contract
 from rebody.store import tree_hash
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, Task
 
 POINT_MASS = "point-mass"
 THESIS_AGENTS = ("reuse", "retrain", "readout", "bayes")
-ROBOT_AGENTS = ("retrain", "flat")
+ROBOT_AGENTS = ("retrain", "flat", "scratch")
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,8 @@ class Trial:
     tracker: LoadedTracker | None
     flat: LoadedFlat | None = None
     """The policy of agent `flat`."""
+    scratch: LoadedScratch | None = None
+    """All of agent `scratch`."""
     high_level: LoadedHighLevel | None = None
     """The policy of agent `retrain`."""
     slots: LoadedSlots | None = None
@@ -76,6 +80,16 @@ class Trial:
     def robot_name(self) -> str:
         """Name of the body."""
         return POINT_MASS if self.robot is None else self.robot.name
+
+    @property
+    def contract(self) -> Contract:
+        """Of the module that believes: `scratch` brings its own."""
+        return self.scratch.contract if self.scratch else self.inference.contract
+
+    @property
+    def module_name(self) -> str:
+        """Of that module."""
+        return self.scratch.name if self.scratch else self.inference.name
 
     @property
     def decisions(self) -> int:
@@ -102,7 +116,7 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
     return Results(
         robot=trial.robot_name,
         agent=trial.agent,
-        inference=trial.inference.name,
+        inference=trial.module_name,
         tracker=trial.tracker.name if trial.tracker else None,
         control_dt=trial.robot.control_dt if trial.robot else DECISION_DT,
         stride="predicted" if trial.step_predictor else trial.stride,
@@ -124,15 +138,21 @@ def trial_agent(trial: Trial, tasks: Task) -> Agent:
     slots = None
     if trial.agent == "reuse" and trial.robot is not None:
         slots = slot_chooser(trial.inference, trial.slots, trial.slots_by)
-    high_level = trial.high_level.policy if trial.high_level else None
     return build_agent(
-        trial.agent, trial.inference, tasks, slots=slots, high_level=high_level, stride=stride, horizon=trial.horizon
+        trial.agent,
+        trial.inference,
+        tasks,
+        slots=slots,
+        high_level=trial.high_level.policy if trial.high_level else None,
+        scratch=trial.scratch.parts if trial.scratch else None,
+        stride=stride,
+        horizon=trial.horizon,
     )
 
 
 def run_trial(trial: Trial, agent: Agent, tasks: Task, seeds: np.ndarray) -> Episodes:
     """Episodes as arrays, 0.1 s apart; `tasks` are the active ones, [time, episode]."""
-    form = trial.inference.contract.reward
+    form = trial.contract.reward
     if trial.robot is None:
         episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, form)
     else:
@@ -152,7 +172,7 @@ def _run_oracle(trial: Trial, tasks: Task, seeds: np.ndarray) -> Episodes | None
 def _clusters(trial: Trial, episodes: Episodes) -> Int[np.ndarray, "time episode"]:
     """The mixture's component of each belief of the module; 0 where there is one Gaussian, or another inferrer."""
     mixture, latent = trial.inference.parts.mixture, episodes.belief.mean
-    if mixture is None or trial.agent == "bayes":
+    if mixture is None or trial.agent in ("bayes", "scratch"):
         return np.zeros(latent.shape[:2], int)
     return np.asarray(mixture.component(latent))
 
@@ -169,6 +189,9 @@ def trial_controller(trial: Trial) -> Controller:
     if trial.agent == "flat":
         assert trial.flat is not None
         return FlatController(trial.flat.policy)
+    if trial.agent == "scratch":
+        assert trial.scratch is not None
+        return ScratchController(trial.scratch.parts.policy, trial.scratch.parts.module.decoder)
     assert trial.tracker is not None
     assert trial.robot is not None
     return TrackerController(trial.tracker.tracker, trial.robot.goal_ahead)
@@ -189,8 +212,8 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
             raise RebodyError(f"agent '{trial.agent}' learned on a robot, and a point mass is none.")
         return
     slots = trial.tracker.tracker.slots if trial.tracker else slots_of(trial.robot.reach)
-    trial.inference.contract.check_body(trial.robot.name, trial.robot.moving_fields, slots)
-    for part in (trial.tracker, trial.flat, trial.high_level, trial.step_predictor):
+    trial.contract.check_body(trial.robot.name, trial.robot.moving_fields, slots)
+    for part in (trial.tracker, trial.flat, trial.scratch, trial.high_level, trial.step_predictor):
         if part is not None:
             check_robot_of(part, trial.robot)
     if trial.flat is not None:
@@ -205,7 +228,7 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
 
 
 def _check_tasks(trial: Trial, specs: list[TaskSpec]) -> None:
-    known = trial.inference.contract.target_ranges
+    known = trial.contract.target_ranges
     for spec in specs:
         if spec.switch is not None and round(spec.switch.at_s / DECISION_DT) >= trial.decisions:
             raise RebodyError(f"a switch at {spec.switch.at_s:g} s is not within an episode of {trial.seconds:g} s.")
@@ -213,6 +236,6 @@ def _check_tasks(trial: Trial, specs: list[TaskSpec]) -> None:
             # a robot's oracle and an idle one need no module
             if family not in known and (trial.robot is None or trial.agent not in ("oracle", "idle")):
                 raise RebodyError(
-                    f"'{trial.inference.name}' was trained on {', '.join(known)} and cannot infer '{family}'. "
+                    f"'{trial.module_name}' was trained on {', '.join(known)} and cannot infer '{family}'. "
                     "Choose tasks or a module that fit (rebody list)."
                 )

@@ -1,5 +1,7 @@
 """Robots with a frozen module each that listens: what policies learn from that act by its beliefs."""
 
+from collections.abc import Mapping
+
 import equinox as eqx
 import numpy as np
 from jaxtyping import Float, PRNGKeyArray
@@ -23,8 +25,13 @@ class Minds(eqx.Module):
 
 def tasks_within(module: Inference, reach: Reach) -> TaskDistribution:
     """All that the module can infer, but no speed or pitch that the robot does not reach."""
+    return within_reach(module.contract.target_ranges, reach)
+
+
+def within_reach(target_ranges: Mapping[str, tuple[float, float]], reach: Reach) -> TaskDistribution:
+    """Tasks of families with these ranges, but no speed or pitch that the robot does not reach."""
     limits = {"velocity": reach.speed, "stand": reach.pitch}
-    ends = [(name, *ends, *(limits.get(name) or ends)) for name, ends in module.contract.target_ranges.items()]
+    ends = [(name, *ends, *(limits.get(name) or ends)) for name, ends in target_ranges.items()]
     return TaskDistribution(tuple(BaseTask(name, max(low, a), min(high, b)) for name, low, high, a, b in ends))
 
 

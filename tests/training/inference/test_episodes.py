@@ -148,7 +148,7 @@ def test_refreshed_beliefs_are_those_made_while_collecting(episodes, config, sta
     half = config.episodes // 2
     turned = jax.tree.map(lambda leaf: jnp.concatenate([leaf[:half][::-1], leaf[half:]]), episodes)
     groups = jax.tree.map(lambda *leaves: jnp.stack(leaves), episodes, turned)
-    fresh = refresh_beliefs(state.module.encoder, groups)
+    fresh = refresh_beliefs(state.module.encoder, groups, groups.reward.shape[1] // 2)
     for new, old in zip(jax.tree.leaves(fresh), jax.tree.leaves(groups), strict=True):
         assert new.shape == old.shape
         np.testing.assert_allclose(new, old, atol=1e-5)
@@ -157,7 +157,7 @@ def test_refreshed_beliefs_are_those_made_while_collecting(episodes, config, sta
 def test_refreshing_changes_nothing_but_beliefs_of_the_nominal_half(episodes, config, state):
     other = jax.tree.map(lambda leaf: 1.1 * leaf if isinstance(leaf, jax.Array) else leaf, state.module.encoder)
     groups = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), episodes)
-    fresh = refresh_beliefs(other, groups)
+    fresh = refresh_beliefs(other, groups, groups.reward.shape[1] // 2)
     half = config.episodes // 2
     for name in ("mean", "variance"):
         apart = np.abs(getattr(fresh.belief, name) - getattr(groups.belief, name))
@@ -209,7 +209,7 @@ def test_without_a_window_refreshed_beliefs_are_those_made_while_collecting(stoo
     np.testing.assert_allclose(whole.mean, episodes.belief.mean[:, 1:], rtol=1e-4, atol=1e-5)
     groups = jax.tree.map(lambda leaf: leaf[None], episodes)
     forgotten = jax.tree.map(jnp.zeros_like, groups.belief)
-    fresh = refresh_beliefs(encoder, replace(groups, belief=forgotten)).belief
+    fresh = refresh_beliefs(encoder, replace(groups, belief=forgotten), groups.reward.shape[1] // 2).belief
     np.testing.assert_allclose(fresh.mean[0, :4], episodes.belief.mean[:4], rtol=1e-4, atol=1e-5)
     assert not np.asarray(fresh.mean[0, 4:]).any()
 

@@ -86,10 +86,10 @@ def collect(
 
 
 @eqx.filter_jit
-def refresh_beliefs(encoder: Encoder, episodes: Episodes) -> Episodes:
-    """Groups of episodes with the beliefs that today's encoder holds along the nominal ones: policies learn there."""
-    nominal = episodes.reward.shape[1] // 2
-    state, reward = jax.tree.map(lambda leaf: jnp.moveaxis(leaf[:, :nominal], 2, 0), (episodes.state, episodes.reward))
+def refresh_beliefs(encoder: Encoder, episodes: Episodes, first: int) -> Episodes:
+    """Groups of episodes with the beliefs that today's encoder holds along the first ones of each: those that a policy
+    learns from."""
+    state, reward = jax.tree.map(lambda leaf: jnp.moveaxis(leaf[:, :first], 2, 0), (episodes.state, episodes.reward))
     transitions = Transition(
         jax.tree.map(lambda leaf: leaf[:-1], state), reward, jax.tree.map(lambda leaf: leaf[1:], state)
     )
@@ -98,7 +98,7 @@ def refresh_beliefs(encoder: Encoder, episodes: Episodes) -> Episodes:
         lambda carry, transition: encoder.step(carry, transition), encoder.initial(shape), transitions
     )
     beliefs = _prepend(encoder.prior(shape), beliefs)
-    beliefs = jax.tree.map(lambda old, new: old.at[:, :nominal].set(jnp.moveaxis(new, 0, 2)), episodes.belief, beliefs)
+    beliefs = jax.tree.map(lambda old, new: old.at[:, :first].set(jnp.moveaxis(new, 0, 2)), episodes.belief, beliefs)
     return eqx.tree_at(lambda e: e.belief, episodes, beliefs)
 
 

@@ -32,7 +32,7 @@ from rebody.training.inference.episodes import Episodes, collect, refresh_belief
 from rebody.training.inference.measure import measure
 from rebody.training.inference.report import save_inference
 from rebody.training.run import Metrics, Run
-from rebody.types import AnyArray, Transition
+from rebody.types import AnyArray, Transition, Tree
 
 EVALUATE_EVERY = 10
 HELD_OUT = 200
@@ -95,7 +95,7 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
         metrics |= inference_metrics
     if iteration >= config.wander_iterations:
         if iteration < config.inference_iterations:
-            replay = refresh_beliefs(module.encoder, replay)
+            replay = refresh_beliefs(module.encoder, replay, config.episodes // 2)
             # it acts in no episode itself: later ones, of a policy that hardly explores, would lead it astray
             told_replay = tell(replay, config)
             told, told_metrics = update_policy(told, told_replay, stored, config, config.told_view, keys[2])
@@ -135,7 +135,7 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     one_group = jax.eval_shape(lambda: collect(module, policy.actor, toy, config, roles(config.episodes, True), key))
     return RunState(
         module=module,
-        optimiser=_optimiser(config).init(eqx.filter(module, eqx.is_array)),
+        optimiser=optimiser_of(config).init(eqx.filter(module, eqx.is_array)),
         sac=policy,
         told=told,
         clusters=clusters,
@@ -163,10 +163,10 @@ def trained_parts(state: RunState, config: MetaConfig) -> InferenceParts:
 
 
 @eqx.filter_jit
-def store(replay: Episodes, episodes: Episodes, iteration: Int[Array, ""]):
+def store(replay: Tree, group: Tree, iteration: Int[Array, ""]) -> tuple[Tree, Int[Array, ""]]:
     """The ring with a group more in place of its oldest, and how many groups it holds."""
-    groups = replay.reward.shape[0]
-    replay = jax.tree.map(lambda ring, new: ring.at[iteration % groups].set(new), replay, episodes)
+    groups = len(jax.tree.leaves(replay)[0])
+    replay = jax.tree.map(lambda ring, new: ring.at[iteration % groups].set(new), replay, group)
     return replay, jnp.minimum(iteration + 1, groups)
 
 
@@ -191,7 +191,7 @@ def update_inference(
             lambda a: loss(eqx.combine(a, static), evidence, prior, config.inference, loss_key),
             has_aux=True,
         )(arrays)
-        updates, optimiser = _optimiser(config).update(gradient, optimiser)
+        updates, optimiser = optimiser_of(config).update(gradient, optimiser)
         return (eqx.apply_updates(arrays, updates), optimiser), metrics
 
     keys = jax.random.split(key, config.inference_updates)
@@ -268,7 +268,8 @@ def _shaped(reward: Float[Array, " batch"], config: MetaConfig) -> Float[Array, 
     return reward / config.inference.reward_scale + arrival_bonus(reward, config.arrival, config.arrival_width)
 
 
-def _optimiser(config: MetaConfig) -> optax.GradientTransformation:
+def optimiser_of(config: MetaConfig) -> optax.GradientTransformation:
+    """What moves encoder and decoder: ever smaller steps."""
     updates = max(1, config.inference_iterations * config.inference_updates)
     schedule = optax.cosine_decay_schedule(config.inference.learning_rate, updates, alpha=0.05)
     return optax.chain(optax.clip_by_global_norm(1.0), optax.adam(schedule))

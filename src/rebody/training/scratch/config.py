@@ -1,0 +1,56 @@
+"""Settings of a training run in which a robot learns everything itself."""
+
+from dataclasses import dataclass, field, replace
+
+from rebody.bodies.robot import Reach
+from rebody.control.sac import SACConfig
+from rebody.control.tracker import TrackerReward
+from rebody.inference import InferenceConfig
+from rebody.training.inference.config import MetaConfig
+from rebody.training.inference.presets import goal_velocity
+from rebody.training.minds import within_reach
+
+
+@dataclass(frozen=True)
+class ScratchConfig:
+    """One training run; the defaults spend the cheetah's control steps of a tracker and a high-level policy."""
+
+    robots: int = 64
+    """Copies that move in parallel."""
+    decisions: int = 100
+    """Length of an episode: 10 s."""
+    groups: int = 60
+    """Iterations whose episodes are kept for learning."""
+    iterations: int = 256
+    """Length of the run; an iteration is an episode of every robot."""
+    inference_updates: int = 128
+    """Updates of encoder and decoder in an iteration."""
+    policy_updates: int = 1024
+    """Updates of the policy in an iteration."""
+    start: float = 15.0
+    """Episodes begin anywhere within this from x = 0 [m], so that the latent cannot take the start for the task."""
+    switch_share: float = 0.5
+    """Share of episodes in which the task changes once, as on the toy."""
+    inference: InferenceConfig = field(default_factory=lambda: goal_velocity().inference)
+    """Encoder, decoder and their loss: those of the toy's module."""
+    reward: TrackerReward = field(default_factory=TrackerReward)
+    """What the policy is paid: as a tracker that is told the hidden task."""
+    sac: SACConfig = field(default_factory=lambda: SACConfig(projections=8, decay_updates=260_000))
+    """Hyperparameters of soft actor-critic."""
+
+    def meta(self, reach: Reach) -> MetaConfig:
+        """The toy's settings for episodes of robots: `goal-velocity` within reach, one Gaussian as the prior."""
+        base = goal_velocity()
+        return replace(
+            base,
+            tasks=within_reach(base.target_ranges, reach),
+            inference=self.inference,
+            prior="gaussian",
+            switch_share=self.switch_share,
+            episodes=self.robots,
+            decisions=self.decisions,
+            groups=self.groups,
+            wander_iterations=0,
+            joint_iterations=self.iterations,
+            inference_updates=self.inference_updates,
+        )

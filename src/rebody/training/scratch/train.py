@@ -1,0 +1,276 @@
+"""Learning everything on a robot: what task is on, and how to do it (agent `scratch`).
+
+The encoder and decoder of the toy's module learn from the robot's own episodes, the policy off-policy beside them on
+beliefs that today's encoder holds along stored episodes, as PEARL does (Rakelly et al. 2019). Nothing is reused.
+"""
+
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from jaxtyping import Array, Float, Int, PRNGKeyArray
+
+from rebody.agents.parts import ScratchParts
+from rebody.bodies import RobotBatch, load_robot
+from rebody.bodies.robot import Reach
+from rebody.control import sac
+from rebody.control.high_level import Places
+from rebody.control.sac import Actor, SACBatch, SACState
+from rebody.control.scratch import ScratchPolicy, observed, scratch_observation
+from rebody.control.tracker import Motion, TrackerReward, relative, tracker_reward
+from rebody.inference.module import InferenceModule
+from rebody.inference.prior import SplitPrior, unit_gaussian
+from rebody.inference.probe import Probe
+from rebody.training.inference.config import MetaConfig
+from rebody.training.inference.episodes import Episodes, refresh_beliefs
+from rebody.training.inference.train import optimiser_of, store, update_inference
+from rebody.training.minds import Minds, listen, put_on_feet
+from rebody.training.motion import motion_of
+from rebody.training.run import Metrics, Run
+from rebody.training.scratch.config import ScratchConfig
+from rebody.training.scratch.report import measure, save_scratch
+from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task
+
+EVALUATE_EVERY = 16
+
+
+class ControlSteps(eqx.Module):
+    """Control steps of robots; a replay has [group, step, robot]."""
+
+    joints: Float[AnyArray, "*steps robot joint"]
+    x: Float[AnyArray, "*steps robot"]
+    action: Float[AnyArray, "*steps robot action"]
+    reward: Float[AnyArray, "*steps robot"]
+    next_joints: Float[AnyArray, "*steps robot joint"]
+    next_x: Float[AnyArray, "*steps robot"]
+
+
+class Replay(eqx.Module):
+    """A ring of groups: an episode of every robot, its decisions and its control steps."""
+
+    episodes: Episodes
+    steps: ControlSteps
+
+
+class RunState(eqx.Module):
+    """Everything that a resumed run needs; robots begin anew in every iteration."""
+
+    module: InferenceModule
+    optimiser: optax.OptState
+    sac: SACState
+    replay: Replay
+    iteration: Int[Array, ""]
+
+
+def train_scratch(robot: str, config: ScratchConfig, out: Path, seed: int, *, resume: bool = False) -> Path:
+    """Train module and policy; returns the artifact's folder.
+
+    RebodyError if `out` holds another run; Interrupted on Ctrl-C.
+    """
+    spec = load_robot(robot)
+    run = Run(out, asdict(config) | {"robot": robot, "seed": seed}, resume=resume)
+    batch, meta = RobotBatch(spec, config.robots), config.meta(spec.reach)
+    state = run.restore(initial_state(config, meta, batch, jax.random.key(seed)))
+    state = run.loop(state, lambda state: iterate(state, batch, config, meta, seed), config.iterations, "scratch")
+    return save_scratch(trained_parts(state, meta), spec, config, meta, run, seed)
+
+
+def iterate(
+    state: RunState, batch: RobotBatch, config: ScratchConfig, meta: MetaConfig, seed: int
+) -> tuple[RunState, Metrics]:
+    """An episode of every robot, then updates of the module and of the policy, now and then an evaluation."""
+    iteration = int(state.iteration)
+    rng = np.random.default_rng((seed, 2, iteration))
+    keys = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration), 3)
+    fresh = collect(state.module, state.sac.actor, batch, config, meta, rng, keys[0])
+    replay, stored = store(state.replay, fresh, state.iteration)
+    prior = SplitPrior(unit_gaussian, config.inference.kinds, config.inference.kind_weight)
+    module, optimiser, metrics = update_inference(
+        state.module, state.optimiser, replay.episodes, stored, prior, meta, keys[1]
+    )
+    replay = replace(replay, episodes=refresh_beliefs(module.encoder, replay.episodes, config.robots))
+    policy, learned = update_policy(state.sac, module, replay, stored, config, keys[2])
+    state = RunState(module, optimiser, policy, replay, state.iteration + 1)
+    metrics |= learned | {"task_reward": fresh.episodes.reward.mean()}
+    if (iteration + 1) % EVALUATE_EVERY == 0:
+        figures = measure(trained_parts(state, meta), meta, batch.spec)
+        metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
+    return state, {name: float(value) for name, value in metrics.items()}
+
+
+def collect(
+    module: InferenceModule,
+    actor: Actor,
+    batch: RobotBatch,
+    config: ScratchConfig,
+    meta: MetaConfig,
+    rng: np.random.Generator,
+    key: PRNGKeyArray,
+) -> Replay:
+    """One group: every robot acts on a hidden task by what it believes."""
+    task_key, action_key = jax.random.split(key)
+    tasks = meta.tasks.sample_episodes(task_key, config.robots, config.decisions, config.switch_share)
+    tasks = jax.tree.map(np.asarray, tasks)
+    batch.reset(rng)
+    batch.qpos[:, batch.spec.root_addresses[0]] = rng.uniform(-config.start, config.start, batch.size)
+    encoder, shape, here = module.encoder, (batch.size,), batch.spec.observe(batch.qpos, batch.qpos)
+    minds = Minds(encoder.initial(shape), encoder.prior(shape), here, jax.tree.map(lambda leaf: leaf[:, 0], tasks))
+    states, beliefs, actions, rewards, steps = [here], [minds.belief], [], [], []
+    for decision in range(config.decisions):
+        minds = replace(minds, task=jax.tree.map(lambda leaf: leaf[:, decision], tasks))  # noqa: B023 (used at once)
+        key = jax.random.fold_in(action_key, decision)
+        before = batch.qpos.copy()
+        held = hold(batch, minds, module, actor, config, rng, key)
+        minds, earned = listen(encoder, minds, batch.spec.observe(batch.qpos, before), meta.reward)
+        steps += held
+        states.append(minds.state)
+        beliefs.append(minds.belief)
+        actions.append(np.mean([step.action for step in held], axis=0))
+        rewards.append(earned)
+    along = [jax.tree.map(lambda *rows: np.stack(rows, axis=1), *rows) for rows in (states, beliefs, actions, rewards)]
+    return Replay(Episodes(tasks, *along), jax.tree.map(lambda *rows: np.stack(rows), *steps))
+
+
+def hold(
+    batch: RobotBatch,
+    minds: Minds,
+    module: InferenceModule,
+    actor: Actor,
+    config: ScratchConfig,
+    rng: np.random.Generator,
+    key: PRNGKeyArray,
+) -> list[ControlSteps]:
+    """The control steps of a decision, all by the same belief."""
+    understood, steps, places = _understand(module, minds.belief), [], config.inference.places
+    for step in range(batch.spec.steps_per_decision):
+        joints, x, before = batch.joint_state(), batch.x.astype(np.float32), batch.qpos.copy()
+        action = _explore(actor, places, joints, x, understood, jax.random.fold_in(key, step))
+        batch.step(np.asarray(action))
+        seen = ControlSteps(
+            joints=joints,
+            x=x,
+            action=np.asarray(action),
+            reward=pay(batch, before, minds.task, np.asarray(action), config),
+            next_joints=batch.joint_state(),
+            next_x=batch.x.astype(np.float32),
+        )
+        steps.append(seen)
+        put_on_feet(batch, rng)
+    return steps
+
+
+def pay(
+    batch: RobotBatch,
+    before: Float[np.ndarray, "robot nq"],
+    task: Task,
+    action: Float[np.ndarray, "robot action"],
+    config: ScratchConfig,
+) -> Float[np.ndarray, " robot"]:
+    """What a tracker would be paid that was told the hidden task."""
+    spec = batch.spec
+    x, _, pitch = before[:, spec.root_addresses].astype(np.float32).T
+    wanted, motion = Subgoal(task.family, task.target), motion_of(batch, before)
+    return np.asarray(_pay(wanted, x, pitch, motion, action, spec.control_dt, spec.reach, config.reward))
+
+
+@eqx.filter_jit
+def update_policy(
+    policy: SACState,
+    module: InferenceModule,
+    replay: Replay,
+    stored,
+    config: ScratchConfig,
+    key: PRNGKeyArray,
+) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
+    """Steps of soft actor-critic on stored control steps, with today's beliefs."""
+    understood = module.decoder.interpret(replay.episodes.belief)
+
+    def batch_of(_: None, key: PRNGKeyArray) -> SACBatch:
+        return sample_steps(replay, understood, stored, config, key)
+
+    return sac.update_many(policy, batch_of, None, jax.random.split(key, config.policy_updates), config.sac)
+
+
+def sample_steps(replay: Replay, understood: Belief, stored, config: ScratchConfig, key: PRNGKeyArray) -> SACBatch:
+    """Control steps drawn evenly from the groups, with the beliefs held before and after."""
+    episodes, steps, size = replay.episodes, replay.steps, (config.sac.batch_size,)
+    _, length, robots = steps.reward.shape
+    keys = jax.random.split(key, 3)
+    group = jax.random.randint(keys[0], size, 0, stored)
+    step = jax.random.randint(keys[1], size, 0, length)
+    robot = jax.random.randint(keys[2], size, 0, robots)
+    chosen = jax.tree.map(lambda leaf: leaf[group, step, robot], steps)
+    per_decision = length // episodes.reward.shape[-1]
+
+    def observation(joints, x, step):
+        held = jax.tree.map(lambda leaf: leaf[group, robot, step // per_decision], understood)
+        return scratch_observation(config.inference.places, joints, x, held)
+
+    return SACBatch(
+        observation=observation(chosen.joints, chosen.x, step),
+        action=chosen.action,
+        reward=chosen.reward,
+        next_observation=observation(chosen.next_joints, chosen.next_x, step + 1),
+        terminal=jnp.zeros(size),  # what has fallen goes on
+    )
+
+
+def initial_state(config: ScratchConfig, meta: MetaConfig, batch: RobotBatch, key: PRNGKeyArray) -> RunState:
+    """Fresh networks and an empty replay."""
+    module_key, sac_key = jax.random.split(key)
+    actions, joints = batch.spec.model.nu, batch.joint_state().shape[-1]
+    module = InferenceModule(config.inference, actions, module_key)
+    seen = observed(joints, config.inference.places)
+    return RunState(
+        module=module,
+        optimiser=optimiser_of(meta).init(eqx.filter(module, eqx.is_array)),
+        sac=sac.initial_state(seen, actions, config.sac, sac_key),
+        replay=_no_replay(config, batch),
+        iteration=jnp.zeros((), jnp.int32),
+    )
+
+
+def _no_replay(config: ScratchConfig, batch: RobotBatch) -> Replay:
+    groups, robots, decisions = config.groups, config.robots, config.decisions
+    steps, actions = decisions * batch.spec.steps_per_decision, batch.spec.model.nu
+    joints = jnp.zeros((groups, steps, robots, batch.joint_state().shape[-1]))
+    per_step, per_decision = jnp.zeros((groups, steps, robots)), jnp.zeros((groups, robots, decisions))
+    between = jnp.zeros((groups, robots, decisions + 1))
+    latent = jnp.zeros((*between.shape, config.inference.latent))
+    acted = jnp.zeros((groups, robots, decisions, actions))
+    return Replay(
+        Episodes(
+            Task(jnp.zeros(per_decision.shape, jnp.int32), per_decision),
+            GlobalState(*[between] * 8),
+            Belief(latent, latent),
+            acted,
+            per_decision,
+        ),
+        ControlSteps(joints, per_step, jnp.zeros((groups, steps, robots, actions)), per_step, joints, per_step),
+    )
+
+
+def trained_parts(state: RunState, meta: MetaConfig) -> ScratchParts:
+    """What is kept of a run, its probe not yet fitted."""
+    unfitted = jnp.zeros((meta.inference.latent + 1, len(meta.tasks.families)))
+    probe = Probe(jnp.asarray(meta.tasks.families), unfitted, unfitted)
+    return ScratchParts(state.module, ScratchPolicy(state.sac.averaged_actor, meta.inference.places), probe)
+
+
+@eqx.filter_jit
+def _understand(module: InferenceModule, belief: Belief) -> Belief:
+    return module.decoder.interpret(belief)
+
+
+@eqx.filter_jit
+def _explore(actor: Actor, places: Places, joints, x, understood: Belief, key: PRNGKeyArray):
+    return actor.sample(scratch_observation(places, joints, x, understood), key)[0]
+
+
+@eqx.filter_jit
+def _pay(wanted: Subgoal, x, pitch, motion: Motion, action, control_dt: float, reach: Reach, weights: TrackerReward):
+    return tracker_reward(relative(wanted, x, pitch), motion, control_dt, action, reach, weights)

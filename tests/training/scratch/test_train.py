@@ -1,0 +1,116 @@
+"""What a robot learns everything from: its own episodes, with the beliefs of the module that learns beside it."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rebody.bodies import RobotBatch
+from rebody.control.sac import SACConfig
+from rebody.control.scratch import scratch_observation
+from rebody.inference import InferenceConfig
+from rebody.tasks import GOAL, reward
+from rebody.training.scratch import ScratchConfig
+from rebody.training.scratch.train import collect, initial_state, sample_steps
+from rebody.types import Task, Transition
+
+ROBOTS, DECISIONS, GROUPS, START = 3, 5, 2, 15.0
+PER_DECISION, JOINTS = 2, 17
+PLACES = (("x", 10.0), ("vx", 3.0))
+
+
+@pytest.fixture(scope="module")
+def config():
+    inference = InferenceConfig(("x", "vx"), (10.0, 3.0), 1.0, window=4, latent=6, kinds=2, units=8)
+    sac = SACConfig(hidden=(8,), batch_size=500)
+    return ScratchConfig(robots=ROBOTS, decisions=DECISIONS, groups=GROUPS, inference=inference, sac=sac)
+
+
+@pytest.fixture(scope="module")
+def meta(config, cheetah):
+    return config.meta(cheetah.reach)
+
+
+@pytest.fixture(scope="module")
+def state(config, meta, cheetah):
+    return initial_state(config, meta, RobotBatch(cheetah, ROBOTS), jax.random.key(0))
+
+
+@pytest.fixture(scope="module")
+def group(config, meta, state, cheetah):
+    batch = RobotBatch(cheetah, ROBOTS)
+    return collect(state.module, state.sac.actor, batch, config, meta, np.random.default_rng(0), jax.random.key(0))
+
+
+def test_tasks_are_within_reach_and_starts_anywhere(group, meta):
+    ranges = {task.family: (task.low, task.high) for task in meta.tasks.base_tasks}
+    assert ranges == {"goal": (-15.0, 15.0), "velocity": (-3.0, 3.0)}
+    begun = group.episodes.state.x[:, 0]
+    assert (np.abs(begun) <= START).all()
+    assert np.ptp(begun) > 1.0
+
+
+def test_where_a_step_leaves_a_robot_its_next_one_begins(group):
+    steps = group.steps
+    np.testing.assert_array_equal(steps.next_x[:-1], steps.x[1:])
+    np.testing.assert_array_equal(steps.next_joints[:-1], steps.joints[1:])
+    assert steps.x.shape == (DECISIONS * PER_DECISION, ROBOTS)
+
+
+def test_decisions_and_control_steps_tell_of_the_same_motion(group):
+    episodes, steps = group.episodes, group.steps
+    np.testing.assert_array_equal(episodes.state.x[:, :-1].T, steps.x[::PER_DECISION])
+    np.testing.assert_allclose(episodes.state.vx[:, 1:], np.diff(episodes.state.x) / 0.1, atol=1e-4)
+    of_decision = steps.action.reshape(DECISIONS, PER_DECISION, ROBOTS, -1).mean(axis=1)
+    np.testing.assert_allclose(episodes.action, of_decision.swapaxes(0, 1), atol=1e-6)
+
+
+def test_the_module_hears_the_tasks_own_reward_and_the_beliefs_are_its_own(group, state, meta):
+    episodes = group.episodes
+    after = jax.tree.map(lambda leaf: leaf[:, 1:], episodes.state)
+    before = jax.tree.map(lambda leaf: leaf[:, :-1], episodes.state)
+    task = jax.tree.map(jnp.asarray, episodes.task)
+    np.testing.assert_allclose(episodes.reward, reward(task, after, meta.reward), rtol=1e-5)
+    first = jax.tree.map(lambda leaf: leaf[:, :4], Transition(before, episodes.reward, after))  # a window
+    beliefs = state.module.encoder.along(first)
+    np.testing.assert_allclose(episodes.belief.mean[:, 1:5], beliefs.mean, atol=1e-4)
+    np.testing.assert_array_equal(episodes.belief.mean[:, 0], 0.0)
+
+
+def test_a_goal_is_paid_by_its_distance(config, meta, state, cheetah):
+    still = ScratchConfig(**{**vars(config), "switch_share": 0.0})
+    batch = RobotBatch(cheetah, ROBOTS)
+    group = collect(state.module, state.sac.actor, batch, still, meta, np.random.default_rng(0), jax.random.key(3))
+    is_goal = group.episodes.task.family[:, 0] == GOAL
+    assert is_goal.any()
+    miss = np.abs(group.episodes.task.target[:, 0] - group.steps.next_x)[:, is_goal]
+    posture = 0.5 * (1 - np.cos(group.steps.next_joints[..., 1])) + 0.02 * np.mean(group.steps.action**2, axis=-1)
+    expected = 0.05 / (0.1 + miss) - 0.2 * miss - posture[:, is_goal]
+    np.testing.assert_allclose(group.steps.reward[:, is_goal], expected, atol=1e-4)
+
+
+def test_a_control_step_is_learned_from_with_the_belief_of_its_decision(config, state, group):
+    """Whose sample is which shows by x, which no two control steps share."""
+    replay = jax.tree.map(lambda leaf: np.stack([leaf, leaf]), group)
+    understood = state.module.decoder.interpret(jax.tree.map(jnp.asarray, replay.episodes.belief))
+    batch = sample_steps(jax.tree.map(jnp.asarray, replay), understood, 2, config, jax.random.key(1))
+    steps = group.steps
+    for row in range(20):
+        step, robot = np.argwhere((steps.joints == batch.observation[row, :JOINTS]).all(axis=-1))[0]
+        held = [jax.tree.map(lambda leaf: leaf[0, robot, at // PER_DECISION], understood) for at in (step, step + 1)]  # noqa: B023
+        now = scratch_observation(PLACES, steps.joints[step, robot], jnp.asarray(steps.x[step, robot]), held[0])
+        later = scratch_observation(
+            PLACES, steps.next_joints[step, robot], jnp.asarray(steps.next_x[step, robot]), held[1]
+        )
+        np.testing.assert_allclose(batch.observation[row], now, atol=1e-6)
+        np.testing.assert_allclose(batch.next_observation[row], later, atol=1e-6)
+        assert batch.reward[row] == pytest.approx(float(steps.reward[step, robot]), abs=1e-6)
+
+
+def test_the_policy_sees_goals_from_where_it_is_and_speeds_as_they_are(state):
+    belief = Task(np.zeros(1, np.int32), np.zeros(1, np.float32))  # only its shape matters here
+    understood = state.module.decoder.interpret(state.module.encoder.prior(belief.target.shape))
+    joints = np.zeros((1, JOINTS), np.float32)
+    here, there = (scratch_observation(PLACES, joints, np.full(1, x, np.float32), understood) for x in (0.0, 1.0))
+    moved = np.flatnonzero(np.asarray(here != there)[0])
+    np.testing.assert_array_equal(moved, [JOINTS + 2])  # how far ahead the goal is
