@@ -182,7 +182,7 @@ FIGURES = {
             shipped("6.15"),
             lambda _: zero_shot.randomised(),
             zero_shot.draw_randomised,
-            "Three modules, frozen, on the cheetah from x = 0 at rest. They differ in what disturbed the toy in "
+            "Four modules, frozen, on the cheetah from x = 0 at rest. They differ in what disturbed the toy in "
             "training (noise: always; ripple, lag and gain: in half of the episodes). Left: goals, right: speeds; "
             "dotted: what was hidden.",
         ),

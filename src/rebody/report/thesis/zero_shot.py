@@ -23,6 +23,7 @@ DRAWN = ("time_s", "position_m", "velocity_m_s", "family", "target")
 RANDOMISED = {
     "goal-velocity-noise-0": "nothing disturbed",
     "goal-velocity-noise-0.1": "observation noise of variance 0.1",
+    "goal-velocity-noise-0.2": "observation noise of variance 0.2",
     "goal-velocity": "ripple, lag and gain",
 }
 """Modules that differ in what disturbed the toy in their training."""

@@ -1,0 +1,91 @@
+"""What trackers can be told: the error of every speed and pitch, inside and outside of what they were trained for.
+
+    .venv/bin/python benchmarks/reach.py [--robots cheetah ...] [--out runs/reach.png]
+
+Told a speed or a pitch for 10 s, 8 starts each. The *reach* is the widest range around zero in which every
+median error is within the family's tolerance (0.25 m/s, 0.2 rad).
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from rebody.agents.controller import TrackerController
+from rebody.agents.parts import load_tracker
+from rebody.agents.rollout import follow
+from rebody.bodies import load_robot
+from rebody.report.style import figure
+from rebody.tasks import FAMILIES, STAND, VELOCITY
+from rebody.tasks.figures import final_error
+from rebody.training.tracker.report import run_robots
+from rebody.types import Subgoal, Task
+
+TOLD = {VELOCITY: np.arange(-4.0, 4.05, 0.1), STAND: np.arange(-1.5, 1.55, 0.05)}
+STARTS = 8
+
+Curve = dict[float, float]
+"""What was told -> median error."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", nargs="*", default=["cheetah", "hopper", "walker"])
+    parser.add_argument("--out", type=Path, default=Path("runs/reach.png"))
+    arguments = parser.parse_args()
+    found = {robot: curves_of(robot) for robot in arguments.robots}
+    show(found)
+    draw(found, arguments.out)
+
+
+def curves_of(robot: str) -> dict[int, Curve]:
+    """Of each slot but goals: a far goal is a speed."""
+    spec, tracker = load_robot(robot), load_tracker(f"tracker-{robot}").tracker
+    controller, curves = TrackerController(tracker, spec.goal_ahead), {}
+    for slot, values in TOLD.items():
+        if FAMILIES[slot].name not in tracker.slots:
+            continue
+        told = np.repeat(values, STARTS).astype(np.float32)
+        command = Subgoal(np.full(len(told), slot, np.int32), told)
+        states, _ = run_robots(spec, len(told), lambda batch, command=command: follow(controller, batch, command))
+        errors = final_error(Task(command.slot, command.value), states).reshape(-1, STARTS)
+        curves[slot] = dict(zip(values.round(2).tolist(), np.median(errors, axis=1).tolist(), strict=True))
+    return curves
+
+
+def reach_of(curve: Curve, tolerance: float) -> tuple[float, float]:
+    """The widest range around zero without an error beyond the tolerance."""
+    missed = [value for value, error in curve.items() if error > tolerance]
+    low, high = max((v for v in missed if v < 0), default=-np.inf), min((v for v in missed if v > 0), default=np.inf)
+    held = [value for value in curve if low < value < high]
+    return min(held), max(held)
+
+
+def show(found: dict[str, dict[int, Curve]]) -> None:
+    """A Markdown table: the reach beside what was trained for."""
+    print("| robot | slot | trained for | reach |\n|---|---|---|---|")
+    for robot, curves in found.items():
+        reach = load_tracker(f"tracker-{robot}").tracker.reach
+        for slot, curve in curves.items():
+            family, trained = FAMILIES[slot], reach.speed if slot == VELOCITY else reach.pitch
+            low, high = reach_of(curve, family.tolerance)
+            print(f"| {robot} | {family.name} [{family.unit}] | {trained} | {low:g} to {high:g} |")
+
+
+def draw(found: dict[str, dict[int, Curve]], out: Path) -> None:
+    """A panel per slot, a line per robot."""
+    with figure(out, 1, len(TOLD), size=(11.0, 4.2)) as (_, panels):
+        for axes, slot in zip(panels, TOLD, strict=True):
+            family = FAMILIES[slot]
+            for robot, curves in found.items():
+                if slot in curves:
+                    axes.plot(list(curves[slot]), list(curves[slot].values()), ".-", ms=4, label=robot)
+            axes.axhline(family.tolerance, color="#999999", lw=0.8, ls=":")
+            axes.set(
+                xlabel=f"told {family.name} [{family.unit}]", ylabel=f"final error [{family.unit}]", ylim=(0, None)
+            )
+            axes.legend(frameon=False, fontsize=8)
+
+
+if __name__ == "__main__":
+    main()
