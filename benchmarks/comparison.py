@@ -19,7 +19,7 @@ from rebody.store import load_artifact
 from rebody.tasks.task_file import read_tasks
 
 TASKS = Path(__file__).parent / "tasks"
-AGENTS = ("oracle", "bayes", "readout", "reuse", "retrain", "flat", "idle")
+AGENTS = ("oracle", "bayes", "readout", "reuse", "retrain", "scratch", "flat", "idle")
 COLUMNS = (
     "robot", "module", "agent", "goal: median error [m]", "velocity: median error [m/s]", "return",
     "base task right [%]", "fell [%]", "robot steps [million]", "training [min]",
@@ -78,12 +78,14 @@ def judge(trial: Trial, path: Path, seeds: int) -> Results:
 def costs(trial: Trial) -> tuple[float, float]:
     """Control steps that the robot took for all that was trained on it [million], and how long that took [min]."""
     assert trial.robot is not None
-    parts = {"tracker": None if trial.flat else trial.tracker, "high-level": trial.high_level, "flat": trial.flat}
+    tracker = None if trial.flat or trial.scratch else trial.tracker
+    parts = {"tracker": tracker, "high-level": trial.high_level, "flat": trial.flat, "scratch": trial.scratch}
     steps = seconds = 0.0
     for kind, part in ((kind, part) for kind, part in parts.items() if part):
         training = load_artifact(part.name, kind).config["training"]
-        per_step = trial.robot.steps_per_decision if kind == "high-level" else 1
-        steps += training["robots"] * training["steps"] * training["iterations"] * per_step / 1e6
+        per_step = trial.robot.steps_per_decision if kind in ("high-level", "scratch") else 1
+        in_iteration = training["decisions"] if kind == "scratch" else training["steps"]
+        steps += training["robots"] * in_iteration * training["iterations"] * per_step / 1e6
         seconds += training["wall_s"]
     return steps, seconds / 60
 

@@ -14,7 +14,7 @@ from rebody.report.thesis import FIGURES, data, find_figures, make_figure, retra
 from rebody.report.thesis import first_experiment as first
 from rebody.report.thesis import several_families as several
 from rebody.report.thesis.data import join, on_goals, save, split, training_log, trajectories
-from rebody.tasks import GOAL, VELOCITY
+from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.tasks.task_file import Switch, TaskSpec
 
 CAPTION = "What is seen, in so many words that a line does not hold all of them. " * 4 + "\nMade by a test."
@@ -28,6 +28,7 @@ def episodes_of(latent, targets=(-9.0, 0.5, 4.0), decision_s=0.1, time=40):
         "time_s": time_s,
         "position_m": position,
         "velocity_m_s": np.gradient(position, axis=0) / 0.1,
+        "pitch_rad": position,
         "latent": np.stack([(i + 1) * position / 10 for i in range(latent)], axis=-1),
         "family": np.full(len(targets), GOAL),
         "target": np.array(targets),
@@ -42,12 +43,12 @@ def curves_of(*names, measured_every=3, rows=12):
     return {"steps": steps} | {name: falling.astype(np.float32) for name in names}
 
 
-def several_of(episodes=3):
+def several_of(episodes=3, families=(GOAL, VELOCITY)):
     """Latents in two dimensions of a few episodes on each base task."""
-    targets = np.concatenate([side * np.arange(2.0, 2.0 + episodes) for side in (1, -1, 1, -1)])
+    targets = np.concatenate([side * np.arange(2.0, 2.0 + episodes) for side in (1, -1) * len(families)])
     data = episodes_of(6, targets)
     rng = np.random.default_rng(0)
-    family = np.repeat([GOAL, VELOCITY], 2 * episodes)
+    family = np.repeat(families, 2 * episodes)
     return data | {"family": family} | {name: rng.normal(size=(6, len(targets), 2)) for name in ("tsne", "pca")}
 
 
@@ -74,7 +75,11 @@ SYNTHETIC = {
     "6.14b": several_of(),
     "6.15": join({name: several_of(several.EPISODES) for name in zero_shot.RANDOMISED}),
     "6.19": join({f"high-level-{m}-{robot}": curves_of("evaluation/return") for m, robot in retrained.POLICIES}),
-    "6.20": join({f"high-level-{m}-{robot}": several_of(several.EPISODES) for m, robot in retrained.POLICIES}),
+    **dict.fromkeys(
+        ("6.20", "6.21"),
+        join({f"high-level-{m}-{robot}": several_of(several.EPISODES) for m, robot in retrained.POLICIES}),
+    ),
+    "6.22": several_of(several.EPISODES, (GOAL, VELOCITY, STAND)),
     **dict.fromkeys(("6.16", "6.17", "6.18"), ON_ROBOT),
 }  # fmt: skip
 

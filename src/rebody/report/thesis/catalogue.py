@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from rebody.errors import RebodyError
@@ -191,21 +192,39 @@ FIGURES = {
         _zero_shot("6.18", "hopper"),
         ThesisFigure(
             "6.19",
-            "high levels learned on the cheetah: training",
+            "high levels learned on robots: training",
             retrained.training,
             retrained.train_again,
             retrained.draw_training,
-            "Learning a high-level policy on the cheetah, its tracker and the module frozen: return over 20 s on 100 "
-            "held-out goals and speeds.",
+            "Learning a high-level policy on a robot, its tracker and the module frozen: return over 20 s on 100 "
+            "held-out tasks.",
         ),
         ThesisFigure(
             "6.20",
             "high levels learned on the cheetah: goals and speeds",
             shipped("6.20"),
-            lambda _: retrained.on_robots(),
-            retrained.draw_ways,
+            lambda _: retrained.on_robots(retrained.ON_CHEETAH),
+            partial(retrained.draw_ways, retrained.ON_CHEETAH),
             "High-level policies that were learned on the cheetah, by module, from x = 0 at rest. Left: goals, right: "
             "speeds; dotted: what was hidden.",
+        ),
+        ThesisFigure(
+            "6.21",
+            "high levels learned on walker and hopper: goals and speeds",
+            shipped("6.21"),
+            lambda _: retrained.on_robots(retrained.BALANCING),
+            partial(retrained.draw_ways, retrained.BALANCING),
+            "High-level policies that were learned on robots that have to balance, `goal-velocity` frozen, from x = 0 "
+            "at rest. Left: goals, right: speeds; dotted: what was hidden.",
+        ),
+        ThesisFigure(
+            "6.22",
+            "a high level learned on the cheetah: goals, speeds and stands",
+            shipped("6.22"),
+            lambda _: retrained.standing(),
+            retrained.draw_standing,
+            "A high-level policy that was learned on the cheetah, `goal-velocity-stand` frozen, from x = 0 at rest. "
+            "Left: goals, middle: speeds, right: stands; dotted: what was hidden.",
         ),
     )
 }

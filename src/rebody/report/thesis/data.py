@@ -51,8 +51,8 @@ def on_goals(trial: Trial, targets: np.ndarray) -> Data:
 def trajectories(trial: Trial, specs: list[TaskSpec]) -> Data:
     """Episodes on hidden tasks.
 
-    time_s [time]; position_m and velocity_m_s [time, episode]; latent [time, episode, latent]; family (its index)
-    and target [episode]. `decision_s` is the time from one decision to the next.
+    time_s [time]; position_m, velocity_m_s and pitch_rad [time, episode]; latent [time, episode, latent]; family
+    (its index) and target [episode]. `decision_s` is the time from one decision to the next.
     """
     check_trial(trial, specs)
     tasks = active_tasks(specs, trial.decisions, DECISION_DT)
@@ -64,6 +64,7 @@ def trajectories(trial: Trial, specs: list[TaskSpec]) -> Data:
         "time_s": DECISION_DT * (kept + 1.0),
         "position_m": np.asarray(episodes.state.x)[kept],
         "velocity_m_s": np.asarray(episodes.state.vx)[kept],
+        "pitch_rad": np.asarray(episodes.state.pitch)[kept],
         "latent": np.asarray(episodes.belief.mean)[kept],
         "family": np.asarray(tasks.family[-1]),
         "target": np.asarray(tasks.target[-1], float),

@@ -1,6 +1,6 @@
 """Section 6.4.2 of the thesis: one module for goals and speeds, front and back."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,11 +8,12 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from rebody.agents.parts import load_inference
+from rebody.bodies.robot import Reach
 from rebody.evaluation.evaluate import Trial
 from rebody.report.style import BELIEF, MOTION, ORACLE, TRUTH, figure
 from rebody.report.thesis.data import Data, split, training_log, trajectories
 from rebody.report.thesis.panels import caption, draw_curve
-from rebody.tasks import GOAL, VELOCITY, base_task
+from rebody.tasks import GOAL, STAND, VELOCITY, base_task
 from rebody.tasks.task_file import TaskSpec
 from rebody.training.inference import PRESETS, train_inference
 from rebody.types import Task
@@ -23,8 +24,16 @@ BASE_TASKS = {
     2 * GOAL: ("goal behind", "#2b6f9e"),
     2 * VELOCITY + 1: ("run forward", "#e0a526"),
     2 * VELOCITY: ("run backward", "#4f9a6b"),
+    2 * STAND + 1: ("stand, pitch above 0", "#7d4e9e"),
+    2 * STAND: ("stand, pitch below 0", "#5a5a5a"),
 }
 """Name and colour by the number that `base_task` gives."""
+SERIES = {
+    GOAL: ("position_m", "x [m]"),
+    VELOCITY: ("velocity_m_s", "velocity [m/s]"),
+    STAND: ("pitch_rad", "pitch [rad]"),
+}
+"""Of each family: what is to reach the target, and its label."""
 EPISODES = 12
 """Of each base task in a picture of latents."""
 SHOWN = 4
@@ -106,20 +115,21 @@ def in_plane(latents: Latents, projection: Callable[[np.ndarray], np.ndarray]) -
     return flat.reshape(*latents.shape[:2], 2).astype(np.float32)
 
 
-def tasks_of_each_kind(speeds: tuple[float, float] = (-np.inf, np.inf)) -> list[TaskSpec]:
-    """Evenly spaced over each base task, as far as a body is fast enough [m/s]."""
+def tasks_of_each_kind(reach: Reach | None = None, preset: str = "goal-velocity") -> list[TaskSpec]:
+    """Evenly spaced over each base task, as far as a body reaches."""
+    limits = {"velocity": reach.speed, "stand": reach.pitch} if reach else {}
     specs = []
-    for task in PRESETS["goal-velocity"]().tasks.base_tasks:
-        slowest, fastest = speeds if task.family == "velocity" else (-np.inf, np.inf)
-        targets = np.linspace(max(task.low, slowest), min(task.high, fastest), EPISODES)
+    for task in PRESETS[preset]().tasks.base_tasks:
+        low, high = limits.get(task.family) or (-np.inf, np.inf)
+        targets = np.linspace(max(task.low, low), min(task.high, high), EPISODES)
         specs += [TaskSpec(task.family, float(target)) for target in targets]
     return specs
 
 
 def draw_ways(data: Data, path: Path, text: str) -> None:
     """Positions on goals, velocities on speeds."""
-    with figure(path, 1, 2, size=(10.5, 4.4)) as (drawing, (positions, velocities)):
-        ways_panels(positions, velocities, data)
+    with figure(path, 1, 2, size=(10.5, 4.4)) as (drawing, panels):
+        ways_panels(panels, data)
         caption(drawing, text)
 
 
@@ -127,16 +137,16 @@ def draw_ways_of_each(data: Data, titles: Mapping[str, str], path: Path, text: s
     """A row for each of several logs, under its title."""
     rows = len(titles)
     with figure(path, rows, 2, size=(10.5, 1.0 + 3.6 * rows)) as (drawing, panels):
-        for (part, title), positions, velocities in zip(titles.items(), panels[::2], panels[1::2], strict=True):
-            ways_panels(positions, velocities, split(data, part))
-            positions.set_title(title, fontsize=9, loc="left")
+        for (part, title), row in zip(titles.items(), zip(panels[::2], panels[1::2], strict=True), strict=True):
+            ways_panels(row, split(data, part))
+            row[0].set_title(title, fontsize=9, loc="left")
         caption(drawing, text)
 
 
-def ways_panels(positions: Axes, velocities: Axes, data: Data) -> None:
-    """A few episodes of each base task, dotted what was hidden."""
-    panels = ((positions, GOAL, "position_m", "x [m]"), (velocities, VELOCITY, "velocity_m_s", "velocity [m/s]"))
-    for axes, family, series, label in panels:
+def ways_panels(panels: Sequence[Axes], data: Data) -> None:
+    """A few episodes of each base task, dotted what was hidden: a panel for goals, speeds, and pitches if there is a
+    third."""
+    for axes, (family, (series, label)) in zip(panels, SERIES.items(), strict=False):
         for i in np.flatnonzero(data["family"] == family)[:: EPISODES // SHOWN]:
             _, colour = BASE_TASKS[_labels(data)[i]]
             axes.plot(data["time_s"], data[series][:, i], color=colour, lw=1.2)

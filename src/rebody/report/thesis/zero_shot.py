@@ -19,7 +19,7 @@ from rebody.report.thesis.several_families import (
 )
 
 MODULE = "goal-velocity"
-DRAWN = ("time_s", "position_m", "velocity_m_s", "family", "target")
+DRAWN = ("time_s", "position_m", "velocity_m_s", "pitch_rad", "family", "target")
 RANDOMISED = {
     "goal-velocity-noise-0": "nothing disturbed",
     "goal-velocity-noise-0.1": "observation noise of variance 0.1",
@@ -61,13 +61,13 @@ def on_robot(module: str, robot: str) -> Data:
     """A module with the toy's policy on a robot, on tasks of each kind that the robot is fast enough for."""
     inference, spec = load_inference(module), load_robot(robot)
     trial = Trial("reuse", inference, spec, load_tracker(f"tracker-{robot}"), slots=load_slots_of(inference, None))
-    return trajectories(trial, tasks_of_each_kind(spec.reach.speed))
+    return trajectories(trial, tasks_of_each_kind(spec.reach))
 
 
 def draw_robot(data: Data, path: Path, text: str) -> None:
     """Ways on goals and on speeds, and the latents."""
     with figure(path, 1, 3, size=(14.0, 4.6)) as (drawing, (positions, velocities, latents)):
-        ways_panels(positions, velocities, data)
+        ways_panels((positions, velocities), data)
         latents.plot(*data["toy_pca"].reshape(-1, 2).T, ".", color="#d0d0d0", ms=7, label="on the toy")
         points_panel(latents, data["pca"], data)
         latents.legend(frameon=False, fontsize=8, markerscale=2)
