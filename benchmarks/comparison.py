@@ -47,7 +47,7 @@ def compare(options: TrialOptions, seeds: int, out: Path) -> None:
     """Print a row, if there are the parts for it."""
     try:
         trial = options.load()
-        results = judge(trial, out / f"{options.robot}-{trial.inference.name}-{options.agent}.json", seeds)
+        results = judge(trial, out / f"{options.robot}-{trial.inference.name}-{options.agent}-{seeds}.json", seeds)
     except RebodyError as error:
         print(f"{options.robot}, {options.agent}: left out, {error}")
         return

@@ -113,8 +113,10 @@ class LoadedHighLevel:
     robot: str
     inference_hash: str
     """Of the module's weights."""
+    tracker: str
+    """Name of the tracker."""
     tracker_hash: str
-    """Of the tracker's weights."""
+    """Of its weights."""
     policy: SlotPolicy
 
 
@@ -241,7 +243,14 @@ def load_high_level(reference: str) -> LoadedHighLevel:
     artifact = load_artifact(reference, "high-level")
     with _understood(artifact):
         config, policy = artifact.config, _fill(slot_policy_template, artifact)
-        return LoadedHighLevel(artifact.name, config["robot"], config["inference_hash"], config["tracker_hash"], policy)
+        return LoadedHighLevel(
+            name=artifact.name,
+            robot=config["robot"],
+            inference_hash=config["inference_hash"],
+            tracker=config["tracker"],
+            tracker_hash=config["tracker_hash"],
+            policy=policy,
+        )
 
 
 def load_step_predictor(reference: str) -> LoadedStepPredictor:
