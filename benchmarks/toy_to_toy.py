@@ -13,6 +13,7 @@ from pathlib import Path
 import equinox as eqx
 import numpy as np
 
+from agents import cell
 from rebody.agents.parts import load_inference
 from rebody.bodies.toys import Toy
 from rebody.evaluation import evaluate
@@ -55,11 +56,6 @@ def main() -> None:
 
 def scaled(toy: Toy, name: str, factor: float) -> Toy:
     return eqx.tree_at(lambda t: getattr(t, name), toy, factor * getattr(toy, name))
-
-
-def cell(figure_with_interval: dict[str, float]) -> str:
-    value, low, high = (figure_with_interval[end] for end in ("value", "low", "high"))
-    return f"{value:.3f} [{low:.3f}, {high:.3f}]"
 
 
 def plot(measured: dict, path: Path) -> None:
