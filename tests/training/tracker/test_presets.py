@@ -12,6 +12,11 @@ def test_a_robot_is_trained_for_its_own_reach(name):
     assert tracker_preset(spec).reach == spec.reach
 
 
+def test_a_slot_more_takes_longer():
+    longest = max(shipped_robots(), key=lambda name: tracker_preset(load_robot(name)).iterations)
+    assert load_robot(longest).reach.pitch is not None
+
+
 def test_only_what_has_to_balance_is_paid_for_staying_alive():
     alive = {name: tracker_preset(load_robot(name)).reward.alive for name in shipped_robots()}
     relative = {name: tracker_preset(load_robot(name)).reward.relative for name in shipped_robots()}

@@ -138,8 +138,8 @@ def train_tracker_again(robot: str, runs: Path) -> Data:
 
 def draw_tracker_training(data: Data, path: Path, text: str) -> None:
     """Errors on held-out commands over control steps."""
-    with figure(path, 1, 2, size=(10.0, 4.2)) as (drawing, panels):
-        for axes, slot, unit in zip(panels, ("goal", "velocity"), ("m", "m/s"), strict=True):
+    with figure(path, 1, 3, size=(14.0, 4.2)) as (drawing, panels):
+        for axes, (slot, unit) in zip(panels, (("goal", "m"), ("velocity", "m/s"), ("stand", "rad")), strict=True):
             draw_curve(axes, data, f"evaluation/{slot} median", "median", dots=True)
             draw_curve(axes, data, f"evaluation/{slot} p95", "95th percentile", colour=BELIEF, dots=True)
             axes.set(xlabel="control steps [million]", ylabel=f"{slot}: final error [{unit}]", yscale="log")

@@ -10,6 +10,8 @@ from rebody.training.tracker.config import TrackerConfig
 def tracker_preset(spec: RobotSpec) -> TrackerConfig:
     """Settings for a robot that lies on its belly when it does nothing, or for one that has to balance."""
     sprawling = TrackerConfig(reach=spec.reach)
+    if spec.reach.pitch is not None:  # a slot more is more to learn
+        sprawling = replace(sprawling, iterations=1100, sac=replace(sprawling.sac, decay_updates=280_000))
     if spec.fall.min_height < 0:
         return sprawling
     balancing = replace(
