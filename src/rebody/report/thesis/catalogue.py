@@ -113,8 +113,8 @@ FIGURES = {
             lambda: first.tracker_training_log("cheetah"),
             lambda runs: first.train_tracker_again("cheetah", runs),
             first.draw_tracker_training,
-            "Learning `tracker-cheetah`: errors on 100 held-out goals within 5 m, speeds of +-[0.3, 3] m/s and pitches of "
-            "+-60 degrees, told to the tracker, at each dot.",
+            "Learning `tracker-cheetah`: errors on 100 held-out goals within 5 m, speeds of +-[0.3, 3] m/s and pitches "
+            "of +-60 degrees, told to the tracker, at each dot.",
         ),
         ThesisFigure(
             "6.8",
