@@ -17,16 +17,16 @@ from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
 from rebody.control.flat import FlatPolicy, flat_observation
 from rebody.control.sac import Actor, SACBatch, SACState
-from rebody.control.tracker import relative, slots_of, tracker_reward
+from rebody.control.tracker import slots_of
 from rebody.errors import RebodyError
 from rebody.training.flat.config import FlatConfig
 from rebody.training.flat.report import measure, save_flat
 from rebody.training.minds import Minds, listen, new_minds, put_on_feet
-from rebody.training.motion import motion_of
+from rebody.training.motion import told_reward
 from rebody.training.ring import draw, write
 from rebody.training.run import Metrics, Run
 from rebody.training.transitions import learn, no_transitions
-from rebody.types import AnyArray, Belief, Subgoal, Task
+from rebody.types import AnyArray, Belief
 
 EVALUATE_EVERY = 50
 
@@ -124,7 +124,7 @@ def collect(
         seen = SACBatch(
             observation=observation,
             action=action,
-            reward=_pay(batch, before, minds.task, action, config),
+            reward=told_reward(batch, before, minds.task, action, config.reward),
             next_observation=observe(batch, minds.belief, module),
             terminal=np.zeros(batch.size, np.float32),  # what has fallen goes on
         )
@@ -167,21 +167,6 @@ def reach(module: Inference) -> float:
 def flat_policy(state: RunState, module: Inference) -> FlatPolicy:
     """The averaged actor."""
     return FlatPolicy(state.sac.averaged_actor, reach(module))
-
-
-def _pay(
-    batch: RobotBatch,
-    before: Float[np.ndarray, "robot nq"],
-    task: Task,
-    action: Float[np.ndarray, "robot action"],
-    config,
-) -> Float[np.ndarray, " robot"]:
-    """What a tracker would be paid that was told the hidden task."""
-    spec = batch.spec
-    x, _, pitch = before[:, spec.root_addresses].astype(np.float32).T
-    command = relative(Subgoal(np.asarray(task.family), np.asarray(task.target)), x, pitch)
-    motion = motion_of(batch, before)
-    return np.asarray(tracker_reward(command, motion, spec.control_dt, action, spec.reach, config.reward))
 
 
 @eqx.filter_jit

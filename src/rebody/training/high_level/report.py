@@ -3,23 +3,18 @@
 from dataclasses import asdict
 from pathlib import Path
 
-import jax
-import numpy as np
-
 from rebody.agents.build import build_agent
 from rebody.agents.controller import TrackerController
 from rebody.agents.parts import Inference, LoadedTracker
-from rebody.agents.rollout import rollout_on_robot
 from rebody.bodies import RobotSpec
 from rebody.control.slot_policy import SlotPolicy
 from rebody.store import save_artifact, tree_hash
 from rebody.tasks import FAMILIES
-from rebody.tasks.figures import final_error
 from rebody.training.card import card
+from rebody.training.held_out import act, figures_of, rows_of
 from rebody.training.high_level.config import HighLevelConfig
 from rebody.training.minds import tasks_within
 from rebody.training.run import Run
-from rebody.types import Task
 
 TASKS = 100
 """Held-out tasks."""
@@ -28,18 +23,8 @@ DECISIONS = 200
 
 def measure(policy: SlotPolicy, module: Inference, controller: TrackerController, spec: RobotSpec) -> dict[str, float]:
     """Final error on held-out tasks of each family, return, share that fell."""
-    task = tasks_within(module, spec.reach).sample(jax.random.key(2**31 - 1), (TASKS,))
-    tasks = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (DECISIONS, TASKS)).copy(), task)
-    agent, seeds = build_agent("retrain", module, high_level=policy), np.arange(TASKS)
-    episodes = rollout_on_robot(agent, controller, spec, tasks, module.contract.reward, seeds)
-    errors = final_error(Task(tasks.family[-1], tasks.target[-1]), episodes.state)
-    figures = {}
-    for family in module.contract.families:
-        of_family = errors[tasks.family[-1] == family]
-        figures[f"{FAMILIES[family].name} median"] = float(np.median(of_family))
-        figures[f"{FAMILIES[family].name} p95"] = float(np.percentile(of_family, 95))
-    figures["return"] = float(np.sum(episodes.reward, axis=0).mean())
-    return figures | {"fell": float(np.mean(episodes.fell))}
+    agent, tasks = build_agent("retrain", module, high_level=policy), tasks_within(module, spec.reach)
+    return figures_of(*act(agent, controller, spec, tasks, module.contract.reward, (DECISIONS, TASKS)))
 
 
 def save_high_level(
@@ -67,13 +52,7 @@ def save_high_level(
         "projections": config.sac.projections,
         "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
     }
-    condition = f"{TASKS} held-out tasks, 20 s"
-    rows = {}
-    for family in module.contract.families:
-        name, unit = FAMILIES[family].name, FAMILIES[family].unit
-        rows[f"{name} median, {condition}"] = f"{figures[f'{name} median']:.4f} {unit}"
-        rows[f"{name} 95th percentile, {condition}"] = f"{figures[f'{name} p95']:.4f} {unit}"
-    rows |= {f"return, {condition}": f"{figures['return']:.1f}", "fell": f"{100 * figures['fell']:.1f} %"}
+    rows = rows_of(figures, f"{TASKS} held-out tasks, 20 s")
     decisions = config.iterations * config.steps * config.robots
     what = (
         f"High-level policy of '{spec.name}': (global state, belief of '{module.name}') -> subgoal of "

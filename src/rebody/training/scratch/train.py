@@ -16,12 +16,10 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import ScratchParts
 from rebody.bodies import RobotBatch, load_robot
-from rebody.bodies.robot import Reach
 from rebody.control import sac
 from rebody.control.high_level import Places
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.scratch import ScratchPolicy, observed, scratch_observation
-from rebody.control.tracker import Motion, TrackerReward, relative, tracker_reward
 from rebody.inference.module import InferenceModule
 from rebody.inference.prior import SplitPrior, unit_gaussian
 from rebody.inference.probe import Probe
@@ -29,11 +27,11 @@ from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, refresh_beliefs
 from rebody.training.inference.train import optimiser_of, store, update_inference
 from rebody.training.minds import Minds, listen, put_on_feet
-from rebody.training.motion import motion_of
+from rebody.training.motion import told_reward
 from rebody.training.run import Metrics, Run
 from rebody.training.scratch.config import ScratchConfig
 from rebody.training.scratch.report import measure, save_scratch
-from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task
+from rebody.types import AnyArray, Belief, GlobalState, Task
 
 EVALUATE_EVERY = 16
 
@@ -154,27 +152,13 @@ def hold(
             joints=joints,
             x=x,
             action=np.asarray(action),
-            reward=pay(batch, before, minds.task, np.asarray(action), config),
+            reward=told_reward(batch, before, minds.task, np.asarray(action), config.reward),
             next_joints=batch.joint_state(),
             next_x=batch.x.astype(np.float32),
         )
         steps.append(seen)
         put_on_feet(batch, rng)
     return steps
-
-
-def pay(
-    batch: RobotBatch,
-    before: Float[np.ndarray, "robot nq"],
-    task: Task,
-    action: Float[np.ndarray, "robot action"],
-    config: ScratchConfig,
-) -> Float[np.ndarray, " robot"]:
-    """What a tracker would be paid that was told the hidden task."""
-    spec = batch.spec
-    x, _, pitch = before[:, spec.root_addresses].astype(np.float32).T
-    wanted, motion = Subgoal(task.family, task.target), motion_of(batch, before)
-    return np.asarray(_pay(wanted, x, pitch, motion, action, spec.control_dt, spec.reach, config.reward))
 
 
 @eqx.filter_jit
@@ -269,8 +253,3 @@ def _understand(module: InferenceModule, belief: Belief) -> Belief:
 @eqx.filter_jit
 def _explore(actor: Actor, places: Places, joints, x, understood: Belief, key: PRNGKeyArray):
     return actor.sample(scratch_observation(places, joints, x, understood), key)[0]
-
-
-@eqx.filter_jit
-def _pay(wanted: Subgoal, x, pitch, motion: Motion, action, control_dt: float, reach: Reach, weights: TrackerReward):
-    return tracker_reward(relative(wanted, x, pitch), motion, control_dt, action, reach, weights)

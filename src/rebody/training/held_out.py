@@ -1,0 +1,50 @@
+"""What a policy does on hidden tasks that are held out from its training: figures of a log, rows of a card."""
+
+from collections.abc import Mapping
+
+import jax
+import numpy as np
+
+from rebody.agents.agent import Agent
+from rebody.agents.controller import Controller
+from rebody.agents.rollout import Episodes, rollout_on_robot
+from rebody.bodies import RobotSpec
+from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
+from rebody.tasks.figures import final_error
+from rebody.types import Task
+
+
+def act(
+    agent: Agent,
+    controller: Controller,
+    spec: RobotSpec,
+    tasks: TaskDistribution,
+    form: RewardForm,
+    size: tuple[int, int],
+    seed: int = 0,
+) -> tuple[Task, Episodes]:
+    """Episodes of `size` (decisions, tasks), each on one task to the end; tasks are [decision, episode]."""
+    task = tasks.sample(jax.random.key(2**31 - 1 - seed), size[1:])
+    lasting = jax.tree.map(lambda leaf: np.broadcast_to(leaf, size).copy(), task)
+    return lasting, rollout_on_robot(agent, controller, spec, lasting, form, np.arange(size[1]))
+
+
+def figures_of(tasks: Task, episodes: Episodes) -> dict[str, float]:
+    """Median and 95th percentile of the final error of each family [m, m/s, rad], return, share that fell."""
+    last = jax.tree.map(lambda leaf: leaf[-1], tasks)
+    errors, figures = final_error(last, episodes.state), {}
+    for family in np.unique(last.family):
+        of_family, name = errors[last.family == family], FAMILIES[family].name
+        figures[f"{name} median"] = float(np.median(of_family))
+        figures[f"{name} p95"] = float(np.percentile(of_family, 95))
+    figures["return"] = float(np.sum(episodes.reward, axis=0).mean())
+    return figures | {"fell": float(np.mean(episodes.fell))}
+
+
+def rows_of(figures: Mapping[str, float], condition: str) -> dict[str, str]:
+    """The same for a card; `condition` says on which tasks."""
+    rows = {}
+    for name, unit in ((family.name, family.unit) for family in FAMILIES if f"{family.name} median" in figures):
+        rows[f"{name} median, {condition}"] = f"{figures[f'{name} median']:.4f} {unit}"
+        rows[f"{name} 95th percentile, {condition}"] = f"{figures[f'{name} p95']:.4f} {unit}"
+    return rows | {f"return, {condition}": f"{figures['return']:.1f}", "fell": f"{100 * figures['fell']:.1f} %"}
