@@ -2,8 +2,8 @@
 
     .venv/bin/python benchmarks/reach.py [--robots cheetah ...] [--out runs/reach.png]
 
-Told a speed or a pitch for 10 s, 8 starts each. The *reach* is the widest range around zero in which every
-median error is within the family's tolerance (0.25 m/s, 0.2 rad).
+Told a speed or a pitch for 10 s, 8 starts each. Held is what is missed by no more than the family's tolerance
+(0.25 m/s, 0.2 rad; median of the starts).
 """
 
 import argparse
@@ -53,23 +53,23 @@ def curves_of(robot: str) -> dict[int, Curve]:
     return curves
 
 
-def reach_of(curve: Curve, tolerance: float) -> tuple[float, float]:
-    """The widest range around zero without an error beyond the tolerance."""
-    missed = [value for value, error in curve.items() if error > tolerance]
-    low, high = max((v for v in missed if v < 0), default=-np.inf), min((v for v in missed if v > 0), default=np.inf)
-    held = [value for value in curve if low < value < high]
-    return min(held), max(held)
+def held(curve: Curve, tolerance: float) -> list[tuple[float, float]]:
+    """Ranges without an error beyond the tolerance."""
+    values, is_held = list(curve), [error <= tolerance for error in curve.values()]
+    begins = [i for i, now in enumerate(is_held) if now and not (i and is_held[i - 1])]
+    ends = [i for i, now in enumerate(is_held) if now and not (i + 1 < len(values) and is_held[i + 1])]
+    return [(values[i], values[j]) for i, j in zip(begins, ends, strict=True)]
 
 
 def show(found: dict[str, dict[int, Curve]]) -> None:
-    """A Markdown table: the reach beside what was trained for."""
-    print("| robot | slot | trained for | reach |\n|---|---|---|---|")
+    """A Markdown table: what is held beside what was trained for."""
+    print("| robot | slot | trained for | held within the tolerance |\n|---|---|---|---|")
     for robot, curves in found.items():
         reach = load_tracker(f"tracker-{robot}").tracker.reach
         for slot, curve in curves.items():
             family, trained = FAMILIES[slot], reach.speed if slot == VELOCITY else reach.pitch
-            low, high = reach_of(curve, family.tolerance)
-            print(f"| {robot} | {family.name} [{family.unit}] | {trained} | {low:g} to {high:g} |")
+            ranges = ", ".join(f"{low:g} to {high:g}" for low, high in held(curve, family.tolerance))
+            print(f"| {robot} | {family.name} [{family.unit}] | {trained[0]:g} to {trained[1]:g} | {ranges} |")
 
 
 def draw(found: dict[str, dict[int, Curve]], out: Path) -> None:
