@@ -151,6 +151,21 @@ def test_what_is_read_is_handed_to_the_tracker(agent, trained, evaluate):
         assert set(episode["subgoal_family"]) == {"goal"}
 
 
+def test_one_that_learned_everything_itself_is_judged(trained, evaluate, capsys):
+    parts = ["--agent", "scratch", "--scratch", str(trained["scratch"])]
+    code, results = evaluate(*parts, "--robot", "cheetah")
+    assert code == 0
+    assert "cheetah, scratch" in capsys.readouterr().out
+    assert results["inference"] == "scratch"  # its own module
+    for episode in results["episodes"]:
+        assert set(episode["subgoal"]) == {None}
+        assert len(np.unique(episode["latent"], axis=0)) > 1
+
+    refused(evaluate(*parts, "--robot", "point-mass")[0], capsys, "a point mass is none")
+    refused(evaluate(*parts, "--robot", "hopper")[0], capsys, "trained on 'cheetah', not on 'hopper'")
+    refused(evaluate("--agent", "scratch", "--robot", "cheetah")[0], capsys, "scratch-cheetah")
+
+
 def test_an_own_high_level_policy_is_judged(trained, evaluate, tmp_path, capsys):
     parts = ["--robot", "cheetah", "--tracker", str(trained["tracker"]), "--agent", "retrain"]
     code, results = evaluate(*parts, "--high-level", str(trained["high-level"]))

@@ -113,10 +113,8 @@ class LoadedHighLevel:
     robot: str
     inference_hash: str
     """Of the module's weights."""
-    tracker: str
-    """Name of the tracker."""
     tracker_hash: str
-    """Of its weights."""
+    """Of the tracker's weights."""
     policy: SlotPolicy
 
 
@@ -243,14 +241,7 @@ def load_high_level(reference: str) -> LoadedHighLevel:
     artifact = load_artifact(reference, "high-level")
     with _understood(artifact):
         config, policy = artifact.config, _fill(slot_policy_template, artifact)
-        return LoadedHighLevel(
-            name=artifact.name,
-            robot=config["robot"],
-            inference_hash=config["inference_hash"],
-            tracker=config["tracker"],
-            tracker_hash=config["tracker_hash"],
-            policy=policy,
-        )
+        return LoadedHighLevel(artifact.name, config["robot"], config["inference_hash"], config["tracker_hash"], policy)
 
 
 def load_step_predictor(reference: str) -> LoadedStepPredictor:

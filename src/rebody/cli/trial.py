@@ -23,7 +23,6 @@ from rebody.agents.parts import (
 from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import POINT_MASS, Trial
-from rebody.store import shipped_artifacts
 
 AGENT_HELP = "; ".join(f"{name}: {what}" for name, what in AGENTS.items())
 
@@ -38,7 +37,7 @@ class TrialOptions:
     """Inference artifact: a shipped name or a folder."""
     agent: Annotated[str, tyro.conf.arg(help=AGENT_HELP)] = "reuse"
     tracker: str | None = None
-    """Tracker artifact; default tracker-ROBOT, or the shipped one that the policy of `retrain` was learned with."""
+    """Tracker artifact; default tracker-ROBOT."""
     flat: str | None = None
     """Policy of agent `flat`; default flat-ROBOT."""
     scratch: str | None = None
@@ -72,17 +71,16 @@ class TrialOptions:
         robot = None if self.robot == POINT_MASS else load_robot(self.robot)
         inference = load_inference(self.inference)
         bridged = robot is not None and self.agent == "reuse"
-        high_level = self._high_level(robot)
         return Trial(
             agent=self.agent,
             robot=robot,
             inference=inference,
-            tracker=load_tracker(self.tracker or _usual_tracker(robot, high_level)) if robot else None,
+            tracker=load_tracker(self.tracker or f"tracker-{robot.name}") if robot else None,
             flat=load_flat(self.flat or f"flat-{robot.name}") if robot and self.agent == "flat" else None,
             scratch=load_scratch(self.scratch or f"scratch-{robot.name}")
             if robot and self.agent == "scratch"
             else None,
-            high_level=high_level,
+            high_level=self._high_level(robot),
             slots=load_slots_of(inference, self.classifier) if bridged else None,
             slots_by=self.slots_by,
             seconds=self.seconds,
@@ -116,10 +114,3 @@ class TrialOptions:
         if robot is None or self.stride != "predicted":
             return None
         return load_step_predictor(self.step_predictor or f"step-predictor-{robot.name}")
-
-
-def _usual_tracker(robot: RobotSpec, high_level: LoadedHighLevel | None) -> str:
-    """Name of what moves the joints where nobody says so."""
-    if high_level is not None and (high_level.tracker, "tracker") in shipped_artifacts():
-        return high_level.tracker
-    return f"tracker-{robot.name}"
