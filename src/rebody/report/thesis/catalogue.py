@@ -210,11 +210,11 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.21",
-            "high levels learned on walker and hopper: goals and speeds",
+            "a high level learned on the walker: goals and speeds",
             shipped("6.21"),
             lambda _: retrained.on_robots(retrained.BALANCING),
             partial(retrained.draw_ways, retrained.BALANCING),
-            "High-level policies that were learned on robots that have to balance, `goal-velocity` frozen, from x = 0 "
+            "A high-level policy that was learned on a robot that has to balance, `goal-velocity` frozen, from x = 0 "
             "at rest. Left: goals, right: speeds; dotted: what was hidden.",
         ),
         ThesisFigure(
