@@ -108,11 +108,16 @@ class TrainScratch:
     """Seed of everything that is random."""
     resume: bool = False
     """Go on with the run in --out."""
+    init_from: str | None = None
+    """Start from the networks of this scratch artifact."""
     config: Annotated[ScratchConfig, tyro.conf.arg(name="")] = field(default_factory=ScratchConfig)
 
     def run(self) -> None:
         """Train, save, say where."""
-        _show_card(train_scratch(self.robot, self.config, self.out, self.seed, resume=self.resume))
+        folder = train_scratch(
+            self.robot, self.config, self.out, self.seed, resume=self.resume, init_from=self.init_from
+        )
+        _show_card(folder)
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     clusters = no_clusters(config.mixture.maximum, config.inference.clustered)
     if init_from is not None:
         parts = load_inference(init_from).parts
-        module = _take_over(parts.module, module, init_from)
+        module = take_over(parts.module, module, init_from)
         policy = sac.take_over(policy, parts.high_level.actor, init_from)
         told = sac.take_over(told, parts.told_policy.actor, init_from)
         if parts.mixture is not None and parts.mixture.mean.shape == clusters.prior.mean.shape:
@@ -144,7 +144,8 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     )
 
 
-def _take_over(trained: InferenceModule, fresh: InferenceModule, name: str) -> InferenceModule:
+def take_over(trained: InferenceModule, fresh: InferenceModule, name: str) -> InferenceModule:
+    """The trained module in place of a fresh one; RebodyError if its sizes differ."""
     if jax.tree.map(jnp.shape, trained) != jax.tree.map(jnp.shape, fresh):
         raise RebodyError(f"cannot start from '{name}': its networks have other sizes than these settings.")
     return trained

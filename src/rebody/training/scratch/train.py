@@ -14,7 +14,7 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
-from rebody.agents.parts import ScratchParts
+from rebody.agents.parts import ScratchParts, load_scratch
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
 from rebody.control.high_level import Places
@@ -25,7 +25,7 @@ from rebody.inference.prior import SplitPrior, unit_gaussian
 from rebody.inference.probe import Probe
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, refresh_beliefs
-from rebody.training.inference.train import optimiser_of, store, update_inference
+from rebody.training.inference.train import optimiser_of, store, take_over, update_inference
 from rebody.training.minds import Minds, listen, put_on_feet
 from rebody.training.motion import told_reward
 from rebody.training.run import Metrics, Run
@@ -64,15 +64,17 @@ class RunState(eqx.Module):
     iteration: Int[Array, ""]
 
 
-def train_scratch(robot: str, config: ScratchConfig, out: Path, seed: int, *, resume: bool = False) -> Path:
+def train_scratch(
+    robot: str, config: ScratchConfig, out: Path, seed: int, *, resume: bool = False, init_from: str | None = None
+) -> Path:
     """Train module and policy; returns the artifact's folder.
 
-    RebodyError if `out` holds another run; Interrupted on Ctrl-C.
+    RebodyError if `out` holds another run, or `init_from` has other sizes; Interrupted on Ctrl-C.
     """
     spec = load_robot(robot)
-    run = Run(out, asdict(config) | {"robot": robot, "seed": seed}, resume=resume)
+    run = Run(out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume)
     batch, meta = RobotBatch(spec, config.robots), config.meta(spec.reach)
-    state = run.restore(initial_state(config, meta, batch, jax.random.key(seed)))
+    state = run.restore(initial_state(config, meta, batch, jax.random.key(seed), init_from))
     state = run.loop(state, lambda state: iterate(state, batch, config, meta, seed), config.iterations, "scratch")
     return save_scratch(trained_parts(state, meta), spec, config, meta, run, seed)
 
@@ -203,16 +205,23 @@ def sample_steps(replay: Replay, understood: Belief, stored, config: ScratchConf
     )
 
 
-def initial_state(config: ScratchConfig, meta: MetaConfig, batch: RobotBatch, key: PRNGKeyArray) -> RunState:
-    """Fresh networks and an empty replay."""
+def initial_state(
+    config: ScratchConfig, meta: MetaConfig, batch: RobotBatch, key: PRNGKeyArray, init_from: str | None = None
+) -> RunState:
+    """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
     actions, joints = batch.spec.model.nu, batch.joint_state().shape[-1]
     module = InferenceModule(config.inference, actions, module_key)
     seen = observed(joints, config.inference.places)
+    policy = sac.initial_state(seen, actions, config.sac, sac_key)
+    if init_from is not None:
+        parts = load_scratch(init_from).parts
+        module = take_over(parts.module, module, init_from)
+        policy = sac.take_over(policy, parts.policy.actor, init_from)
     return RunState(
         module=module,
         optimiser=optimiser_of(meta).init(eqx.filter(module, eqx.is_array)),
-        sac=sac.initial_state(seen, actions, config.sac, sac_key),
+        sac=policy,
         replay=_no_replay(config, batch),
         iteration=jnp.zeros((), jnp.int32),
     )
