@@ -16,6 +16,7 @@ from rebody.cli.main import run
 from rebody.training.flat import train as flat
 from rebody.training.inference import train as inference
 from rebody.training.run import Run
+from rebody.training.scratch import train as scratch
 from rebody.training.step_predictor import train as step_predictor
 from rebody.training.tracker import train as tracker
 
@@ -48,7 +49,7 @@ def die():
 
 
 def live(moment, arguments):
-    tracker.Run = inference.Run = flat.Run = step_predictor.Run = partial(DoomedRun, moment)
+    tracker.Run = inference.Run = flat.Run = scratch.Run = step_predictor.Run = partial(DoomedRun, moment)
     os._exit(run([*arguments, "--resume"]))
 
 

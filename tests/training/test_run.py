@@ -161,11 +161,11 @@ def test_a_run_can_start_from_the_networks_of_an_artifact(pipeline, tmp_path, mo
     iterate = pipeline.train.iterate
     monkeypatch.setattr(pipeline.train, "iterate", lambda state, *rest: begun.append(state) or iterate(state, *rest))
     assert pipeline(tmp_path / "second", "--seed", 1, "--init-from", tmp_path / "first") == 0
-    actor = "high_level.actor." if pipeline.name == "inference" else "actor."
+    actor = {"inference": "high_level.actor.", "scratch": "policy.actor."}.get(pipeline.name, "actor.")
     wanted = {name.removeprefix(actor): array for name, array in first.items() if name.startswith(actor)}
     assert len(begun) == TURNS
     assert tree_hash(begun[0].sac.actor) == tree_hash(begun[0].sac.averaged_actor) == tree_hash(wanted)
-    if pipeline.name == "inference":
+    if pipeline.name in ("inference", "scratch"):
         module = {name.removeprefix("module."): a for name, a in first.items() if name.startswith("module.")}
         assert tree_hash(begun[0].module) == tree_hash(module)
     assert tree_hash(pipeline.weights(tmp_path / "second")) != tree_hash(first)

@@ -157,7 +157,7 @@ def test_what_does_not_fit_is_said_and_all_goes_on(looked_at):
     with shown(TaskSpec("goal", 2.0)) as (page, _):
         wait_for(lambda: hasattr(page, "session"), "the start")
         session = page.session
-        page.controls.orders.put(Choice("cheetah", "goal-velocity-stand", "idle"))
+        page.controls.orders.put(Choice("walker", "goal-velocity-stand", "idle"))
         wait_for(lambda: bool(Onlooker.heard), "a complaint")
         assert "the tracker has no slot for stand" in Onlooker.heard[0]
         stood = page.session.time_s
