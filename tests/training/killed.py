@@ -10,38 +10,37 @@ import signal
 import sys
 import threading
 import time
-from functools import partial
+from functools import partialmethod
 
+import rebody.cli.train  # noqa: F401  every pipeline, before the first life
 from rebody.cli.main import run
-from rebody.training.flat import train as flat
-from rebody.training.inference import train as inference
 from rebody.training.run import Run
-from rebody.training.scratch import train as scratch
-from rebody.training.step_predictor import train as step_predictor
-from rebody.training.tracker import train as tracker
 
 FIRST_TURN_S = 1.0  # it compiles
 
 
-class DoomedRun(Run):
-    def __init__(self, moment, *arguments, **options):
-        super().__init__(*arguments, **options, checkpoint_every_s=-1.0)
-        self.last_turn, self.share = divmod(moment, 1.0)
+def doom(moment):
+    """Let every run save a checkpoint after each turn, and die at that moment."""
+    last_turn, share = divmod(moment, 1.0)
+    loop = Run.loop
 
-    def loop(self, state, iterate, iterations, label):
+    def loop_and_die(self, state, iterate, iterations, label):
         begun = []
 
         def iterate_and_die(state):
             begun.append(time.monotonic())
             turn = len(begun) - 1
-            if turn == self.last_turn:
+            if turn == last_turn:
                 expected = begun[-1] - begun[-2] if turn > 1 else FIRST_TURN_S
-                threading.Timer(self.share * expected, die).start()
-            if turn > self.last_turn:
+                threading.Timer(share * expected, die).start()
+            if turn > last_turn:
                 die()  # the turn was shorter than expected
             return iterate(state)
 
-        return super().loop(state, iterate_and_die, iterations, label)
+        return loop(self, state, iterate_and_die, iterations, label)
+
+    Run.__init__ = partialmethod(Run.__init__, checkpoint_every_s=-1.0)
+    Run.loop = loop_and_die
 
 
 def die():
@@ -49,7 +48,7 @@ def die():
 
 
 def live(moment, arguments):
-    tracker.Run = inference.Run = flat.Run = scratch.Run = step_predictor.Run = partial(DoomedRun, moment)
+    doom(moment)
     os._exit(run([*arguments, "--resume"]))
 
 
