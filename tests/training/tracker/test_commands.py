@@ -8,7 +8,7 @@ import pytest
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import MassDamper
 from rebody.control.tracker import MARGIN
-from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.tasks import GOAL, STAND, VELOCITY, family_index, family_names
 from rebody.training.tracker.commands import CommandDistribution, ToyGuide, _scripted_action
 from rebody.types import GlobalState, Task
 
@@ -51,6 +51,14 @@ def test_a_narrower_range_of_speeds_leaves_the_rest_as_it_is():
     distribution, key, reach = CommandDistribution(), jax.random.key(0), Reach(speed=(-1.0, 3.0), distance=4.0)
     full, half = (distribution.sample(key, jnp.zeros(DRAWN), reach, share) for share in (1.0, 0.5))
     np.testing.assert_allclose(half.value, np.where(half.slot == VELOCITY, 0.5, 1.0) * full.value, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", family_names())
+def test_a_network_of_one_slot_is_told_nothing_else(name):
+    reach = Reach(speed=(-1.0, 3.0), distance=4.0, pitch=(-0.5, 0.5))
+    command = CommandDistribution(only=name).sample(jax.random.key(0), jnp.zeros(1000), reach)
+    assert set(np.asarray(command.slot)) == {family_index(name)}
+    assert len(np.unique(command.value)) > 800
 
 
 def test_speeds_are_uniform(drawn):

@@ -1,5 +1,7 @@
 """Settings of each kind of robot."""
 
+from dataclasses import replace
+
 import pytest
 
 from rebody.bodies import load_robot, shipped_robots
@@ -13,8 +15,20 @@ def test_a_robot_is_trained_for_its_own_reach(name):
 
 
 def test_a_slot_more_takes_longer():
-    longest = max(shipped_robots(), key=lambda name: tracker_preset(load_robot(name)).iterations)
-    assert load_robot(longest).reach.pitch is not None
+    cheetah = load_robot("cheetah")
+    two_slots = replace(cheetah, reach=replace(cheetah.reach, pitch=None))
+    assert tracker_preset(cheetah).iterations > tracker_preset(two_slots).iterations
+
+
+def test_only_a_balancing_robot_that_is_to_run_is_told_to_go_slowly_first():
+    widening = {name: tracker_preset(load_robot(name)).widening_iterations for name in shipped_robots()}
+    assert [name for name in widening if widening[name]] == ["walker"]
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_the_last_updates_are_taken_at_the_lowest_learning_rate(name):
+    config = tracker_preset(load_robot(name))
+    assert config.sac.decay_updates == pytest.approx(config.iterations * config.updates, rel=0.01)
 
 
 def test_only_what_has_to_balance_is_paid_for_staying_alive():

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from rebody.control.tracker import MARGIN, Command, Motion
+from rebody.errors import RebodyError
 from rebody.tasks import GOAL, STAND, VELOCITY
-from rebody.training.tracker import train
+from rebody.training.tracker import train, train_tracker
+from rebody.training.tracker.commands import CommandDistribution
 from rebody.training.tracker.train import Replay, collect, initial_state, relabel
 
 CONTROL_DT = 0.05
@@ -28,6 +30,13 @@ def counted(monkeypatch):
         return action
 
     monkeypatch.setattr(train, "_explore", number)
+
+
+def test_the_only_slot_is_one_of_the_robots(tmp_path, config):
+    config = replace(config, commands=CommandDistribution(only="stand"))
+    with pytest.raises(RebodyError, match="'cheetah' is not trained for slot 'stand'; it has: goal, velocity"):
+        train_tracker("cheetah", config, tmp_path / "run", seed=0)
+    assert not (tmp_path / "run").exists()
 
 
 def turn(state, batch, config, i):

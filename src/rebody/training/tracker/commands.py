@@ -1,6 +1,7 @@
 """Commands that a tracker learns from: far and near goals, speeds, standstill, and what a toy would ask."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import equinox as eqx
 import jax
@@ -10,9 +11,10 @@ from jaxtyping import Float, Int, PRNGKeyArray
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import MassDamper, ToyState
 from rebody.control.tracker import MARGIN, Command, slots_of
-from rebody.tasks import GOAL, STAND
+from rebody.tasks import GOAL, STAND, family_index
 from rebody.types import AnyArray, GlobalState, Subgoal, Task
 
+SlotName = Literal["goal", "velocity", "stand"]
 Share = float | Float[AnyArray, ""]
 """Of a whole, in (0, 1]."""
 
@@ -25,6 +27,8 @@ class CommandDistribution:
     """Share of goals drawn log-uniformly between 0.01 and 1 m."""
     zero_share: float = 0.1
     """Share of commands that ask to stand still."""
+    only: SlotName | None = None
+    """The one slot that is asked for; None for all. One network per slot is the other way (thesis 5.6)."""
 
     def sample(
         self, key: PRNGKeyArray, pitch: Float[AnyArray, "*batch"], reach: Reach, speed_share: Share = 1.0
@@ -40,13 +44,18 @@ class CommandDistribution:
         near = sign * 10.0 ** jax.random.uniform(keys[2], shape, minval=-2.0, maxval=0.0)
         goal = jnp.where(jax.random.bernoulli(keys[3], self.near_share, shape), near, far)
         speed = speed_share * _between(MARGIN * reach.speed[0], MARGIN * reach.speed[1], unit)
-        slot = jax.random.randint(keys[4], shape, GOAL, len(slots_of(reach)))
+        slot = self._slots(keys[4], shape, reach)
         asked = jnp.where(slot == GOAL, goal, speed)
         if reach.pitch is not None:
             asked = jnp.where(slot == STAND, _between(MARGIN * reach.pitch[0], MARGIN * reach.pitch[1], unit), asked)
         still = jax.random.bernoulli(keys[5], self.zero_share, shape)
         here = jnp.where(slot == STAND, pitch, 0.0)
         return Command(slot, jnp.where(still, 0.0, asked) - here)
+
+    def _slots(self, key: PRNGKeyArray, shape: tuple[int, ...], reach: Reach) -> Int[AnyArray, "*batch"]:
+        if self.only is not None:
+            return jnp.full(shape, family_index(self.only))
+        return jax.random.randint(key, shape, GOAL, len(slots_of(reach)))
 
 
 def _between(low: float, high: float, unit: Float[AnyArray, "*batch"]) -> Float[AnyArray, "*batch"]:

@@ -6,6 +6,9 @@ from rebody.bodies import RobotSpec
 from rebody.control.tracker import TrackerReward
 from rebody.training.tracker.config import TrackerConfig
 
+FAST = 2.5
+"""A robot that has to balance and is to run faster than this [m/s] is told to go slowly first."""
+
 
 def tracker_preset(spec: RobotSpec) -> TrackerConfig:
     """Settings for a robot that lies on its belly when it does nothing, or for one that has to balance."""
@@ -22,5 +25,10 @@ def tracker_preset(spec: RobotSpec) -> TrackerConfig:
     )
     if not spec.smoothing_s:
         return balancing
-    sac = replace(balancing.sac, decay_updates=230_000)
-    return replace(balancing, iterations=900, widening_iterations=300, sac=sac)
+    return replace(
+        balancing,
+        iterations=1700,
+        widening_iterations=300 if max(map(abs, spec.reach.speed)) > FAST else 0,
+        push_every_s=3.0,
+        sac=replace(balancing.sac, decay_updates=435_000),
+    )

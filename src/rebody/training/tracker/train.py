@@ -17,7 +17,8 @@ from rebody.agents.parts import load_tracker
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
-from rebody.control.tracker import Command, Motion, Tracker, after, tracker_observation, tracker_reward
+from rebody.control.tracker import Command, Motion, Tracker, after, slots_of, tracker_observation, tracker_reward
+from rebody.errors import RebodyError
 from rebody.training.motion import motion_of
 from rebody.training.ring import draw, newest, write
 from rebody.training.run import Metrics, Run
@@ -63,9 +64,13 @@ def train_tracker(
 ) -> Path:
     """Train a tracker; returns the artifact's folder.
 
-    RebodyError if `out` holds another run, or `init_from` has other sizes; Interrupted on Ctrl-C.
+    RebodyError if `out` holds another run, `init_from` has other sizes, or the robot has no such slot as the only one
+    asked for; Interrupted on Ctrl-C.
     """
     spec = load_robot(robot)
+    only, slots = config.commands.only, slots_of(config.reach)
+    if only not in (None, *slots):
+        raise RebodyError(f"'{spec.name}' is not trained for slot '{only}'; it has: {', '.join(slots)}.")
     run = Run(out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume)
     batch = RobotBatch(spec, config.robots)
     batch.reset(np.random.default_rng((seed, 1)))
