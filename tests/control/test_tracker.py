@@ -20,7 +20,7 @@ from rebody.control.tracker import (
     tracker_observation,
     tracker_reward,
 )
-from rebody.tasks import GOAL, STAND, VELOCITY, family_names
+from rebody.tasks import GOAL, JUMP, STAND, VELOCITY, family_names
 from rebody.types import Subgoal
 
 FAR, FAST = 5.0, 3.0
@@ -43,7 +43,7 @@ def motion(displacement, turn=0.0, pitch=0.0, pace=None, fell=False):
     displacement = np.asarray(displacement, np.float32)
     pace = displacement / CONTROL_DT if pace is None else pace
     turn, pitch, pace = (np.full_like(displacement, value) for value in (turn, pitch, pace))
-    return Motion(displacement, turn, pitch, pace, np.full(displacement.shape, fell))
+    return Motion(displacement, turn, pitch, pace, np.full(displacement.shape, fell), np.zeros_like(displacement))
 
 
 def pay(slot, value, displacement, pitch=0.0, action=0.0, control_dt=CONTROL_DT, pace=None):
@@ -65,6 +65,7 @@ def pay(slot, value, displacement, pitch=0.0, action=0.0, control_dt=CONTROL_DT,
 def test_slots_are_the_first_families():
     assert slots_of(REACH) == family_names()[:2]
     assert slots_of(replace(REACH, pitch=(-1.0, 1.0))) == family_names()[:3]
+    assert slots_of(replace(REACH, jump=(1.0, 2.0))) == ("goal", "velocity", "jump")
 
 
 def test_joint_state_comes_first_and_unchanged():
@@ -173,7 +174,7 @@ def test_reward_of_a_pitch_peaks_on_it_however_far_the_robot_lies():
     told, action = command(STAND, np.full_like(turns, 0.2)), np.zeros((101, 6), np.float32)
     still = np.zeros_like(turns)
     for pitch in (0.0, 1.0):
-        moved = Motion(still, turns, still + pitch, still, still > 0)
+        moved = Motion(still, turns, still + pitch, still, still > 0, still)
         paid = np.asarray(tracker_reward(told, moved, CONTROL_DT, action, STANDS, TrackerReward()))
         assert turns[paid.argmax()] == pytest.approx(0.2, abs=1e-6)
         assert paid.max() == pytest.approx(TrackerReward().arrival, abs=1e-5)
@@ -184,6 +185,43 @@ def test_a_third_slot_shows_beside_the_others():
     np.testing.assert_array_equal(observation[:3], [0, 0, 1])
     np.testing.assert_array_equal(observation[3:7], 0)
     np.testing.assert_allclose(observation[7:], [0.3, np.tanh(0.6), np.tanh(3.0)], rtol=1e-6)
+
+
+JUMPS = replace(REACH, jump=(1.0, 2.0))
+
+
+def pay_of_rises(value, vz):
+    """Reward of each of several vertical speeds [m/s]."""
+    vz = np.asarray(vz, np.float32)
+    still = np.zeros_like(vz)
+    moved = Motion(still, still, still, still, still > 0, vz * CONTROL_DT)
+    action = np.zeros((len(vz), 6), np.float32)
+    return np.asarray(
+        tracker_reward(command(JUMP, np.full_like(vz, value)), moved, CONTROL_DT, action, JUMPS, TrackerReward())
+    )
+
+
+@pytest.mark.parametrize("wanted", [1.0, 1.5, 2.0])
+def test_one_jump_at_the_wanted_speed_is_paid_more_than_any_other_hopping(wanted):
+    """Each jump up and down again, one after the other, for as long as gravity takes."""
+
+    def of_hopping(speed):
+        return pay_of_rises(wanted, np.linspace(speed, -speed, 201)).mean()
+
+    speeds = np.linspace(0.1, 3.0, 59)
+    assert speeds[np.argmax([of_hopping(speed) for speed in speeds])] == pytest.approx(wanted, rel=0.2)
+    assert of_hopping(wanted) > 0.1 > of_hopping(wanted / 2)
+
+
+def test_told_to_jump_at_zero_a_robot_is_paid_most_for_staying_down():
+    paid = pay_of_rises(0.0, [-1.0, 0.0, 0.5, 0.6, 1.0])
+    np.testing.assert_array_equal(paid[:3], 0)
+    assert paid[4] < paid[3] < 0
+
+
+def test_a_jump_shows_beside_the_other_slots():
+    observation = tracker_observation(JOINTS, command(JUMP, 1.3), JUMPS)[len(JOINTS) :]
+    np.testing.assert_allclose(observation, [0, 0, 1, 0, 0, 0, 0, 1.3], rtol=1e-6)
 
 
 WALKS = TrackerReward(relative=2.0, alive=0.5)

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from rebody.tasks import FAMILIES, GOAL, STAND, VELOCITY
+from rebody.tasks import FAMILIES, GOAL, JUMP, STAND, VELOCITY
 from rebody.tasks.figures import final_error, final_squared_error, ripple, tolerance
 from rebody.types import GLOBAL_FIELDS, GlobalState, Task
 
@@ -52,6 +52,14 @@ def test_final_error_of_a_velocity_is_that_of_its_mean_over_1_s():
         assert error(VELOCITY, -1.5, x=position, vx=-position) == pytest.approx(3.0)
 
 
+def test_final_error_of_a_jump_is_that_of_the_largest_vertical_speed_of_1_s():
+    vz = np.where(np.arange(50) % 5 == 0, 2.0, -0.5)  # a jump every half a second, the last one at 4.6 s
+    assert error(JUMP, 2.0, vz=vz) == pytest.approx(0.0)
+    assert error(JUMP, 1.5, vz=vz, x=TIMES, vx=TIMES) == pytest.approx(0.5)
+    vz[40] = vz[45] = -0.5  # one less at 4.1 s, one at 4.6 s: the one at 3.6 s counts until 4.5 s
+    assert error(JUMP, 2.0, vz=vz) == pytest.approx(2.5 * 5 / 20)
+
+
 def test_final_error_of_a_velocity_looks_back_3_s():
     position = np.where(TIMES > 2.05, TIMES, 0.0)  # before x(2.1 s), nothing counts
     position[19:] = TIMES[19:]
@@ -67,8 +75,9 @@ def test_an_episode_of_2_s_begins_at_its_start():
 
 
 def test_final_squared_error_is_that_of_the_last_decision():
-    series = states(x=np.array([0.0, 1.0, 3.0]), vx=np.array([9.0, 9.0, 0.5]), pitch=np.array([0.0, 0.0, -1.0]))
-    for family, target, squared in ((GOAL, 5.0, 4.0), (VELOCITY, 2.0, 2.25), (STAND, 0.5, 2.25)):
+    vx, pitch, vz = np.array([[9.0, 9.0, 0.5], [0.0, 0.0, -1.0], [0.0, 2.0, 1.0]])
+    series = states(x=np.array([0.0, 1.0, 3.0]), vx=vx, pitch=pitch, vz=vz)
+    for family, target, squared in ((GOAL, 5.0, 4.0), (VELOCITY, 2.0, 2.25), (STAND, 0.5, 2.25), (JUMP, 1.5, 0.25)):
         assert final_squared_error(task(family, target), series) == pytest.approx(squared)
 
 
@@ -81,7 +90,7 @@ def test_ripple_is_the_spread_of_the_velocity_about_its_mean():
 def test_many_episodes_are_judged_each_by_its_own_task():
     rng = np.random.default_rng(0)
     walks = GlobalState(**{name: rng.normal(size=(50, 2, 3)).cumsum(axis=0) for name in GLOBAL_FIELDS})
-    tasks = Task(np.array([[GOAL, VELOCITY, STAND], [STAND, GOAL, VELOCITY]]), rng.normal(size=(2, 3)))
+    tasks = Task(np.array([[GOAL, VELOCITY, STAND], [JUMP, GOAL, VELOCITY]]), rng.normal(size=(2, 3)))
     found = final_error(tasks, walks), final_squared_error(tasks, walks), ripple(walks)
     assert all(figure.shape == (2, 3) for figure in found)
     for i, j in np.ndindex(2, 3):

@@ -33,6 +33,7 @@ class _Reach(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     speed: tuple[float, float]
     distance: float = Reach.distance
     pitch: tuple[float, float] | None = None
+    jump: tuple[float, float] | None = None
 
 
 class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -125,5 +126,7 @@ def _check_values(spec: RobotSpec, path: Path) -> None:
         problems.append("[reach] distance must be positive, speed = [slowest, fastest] ascending")
     if spec.reach.pitch is not None and not spec.reach.pitch[0] < spec.reach.pitch[1]:
         problems.append("[reach] pitch = [lowest, highest] must be ascending")
+    if spec.reach.jump is not None and not 0 < spec.reach.jump[0] < spec.reach.jump[1]:
+        problems.append("[reach] jump = [slowest, fastest] must be positive and ascending")
     if problems:
         raise RebodyError(f"'{path}': {'; '.join(problems)}.")

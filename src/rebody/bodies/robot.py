@@ -57,6 +57,19 @@ class Reach:
     """Farthest goal [m]; farther ones are cut to it."""
     pitch: tuple[float, float] | None = None
     """Pitches that it can stand at [rad]; None for a robot that is not asked to."""
+    jump: tuple[float, float] | None = None
+    """Vertical speeds that it can jump at [m/s]; None for a robot that is not asked to."""
+
+    @property
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Smallest and largest value of each slot that it has, by the family's name [m ahead, m/s, rad, m/s]."""
+        ends = {
+            "goal": (-self.distance, self.distance),
+            "velocity": self.speed,
+            "stand": self.pitch,
+            "jump": self.jump,
+        }
+        return {name: limits for name, limits in ends.items() if limits is not None}
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from jaxtyping import Float, PRNGKeyArray
 from rebody.bodies.robot import Reach
 from rebody.control.high_level import PolicyView
 from rebody.control.sac import Actor, Critics
-from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.tasks import FAMILIES, GOAL
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal
 
 Slots = tuple[tuple[int, float], ...]
@@ -31,8 +31,7 @@ class SlotPolicy(eqx.Module):
 
 def slots_within(families: tuple[int, ...], reach: Reach) -> Slots:
     """A slot for each family, its scale the largest that may be asked of the robot."""
-    largest = {GOAL: reach.distance, VELOCITY: max(map(abs, reach.speed)), STAND: max(map(abs, reach.pitch or (0.0,)))}
-    return tuple((family, largest[family]) for family in families)
+    return tuple((family, max(map(abs, reach.limits[FAMILIES[family].name]))) for family in families)
 
 
 def pool(values: Float[AnyArray, "*batch slot"]) -> Float[AnyArray, "*batch slot"]:

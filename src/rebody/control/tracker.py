@@ -13,18 +13,20 @@ from jaxtyping import Bool, Float, Int
 
 from rebody.bodies.robot import Reach
 from rebody.control.sac import Actor
-from rebody.tasks.families import GOAL, STAND
+from rebody.tasks.families import GOAL, JUMP, STAND, family_index
 from rebody.types import AnyArray, Subgoal
 
 MARGIN = 1.1
 """Trackers are trained on commands that go beyond a robot's reach by this factor, and cut farther ones to it."""
+LOWEST_JUMP = 0.5
+"""Slowest jump that is paid in full [m/s]; one of 0 is none."""
 
 
 class Command(eqx.Module):
     """A subgoal relative to the robot."""
 
     slot: Int[AnyArray, "*batch"]  # index into `rebody.tasks.FAMILIES`
-    value: Float[AnyArray, "*batch"]  # goal: m ahead of the robot; velocity: m/s; stand: rad to turn
+    value: Float[AnyArray, "*batch"]  # goal: m ahead of the robot; velocity, jump: m/s; stand: rad to turn
 
 
 class Motion(eqx.Module):
@@ -35,6 +37,7 @@ class Motion(eqx.Module):
     pitch: Float[AnyArray, "*batch"]  # rad, afterwards
     pace: Float[AnyArray, "*batch"]  # m/s, afterwards: the speed of this step, or a mean over the last ones
     fell: Bool[AnyArray, "*batch"]
+    rise: Float[AnyArray, "*batch"]  # m
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,9 @@ class TrackerReward:
     """Per m/s from the wanted speed."""
     turn: float = 0.5
     """Per rad from the wanted pitch."""
+    overshoot: float = 4.0
+    """Of a jump, which is paid by the square of its share of the wanted vertical speed: price of each share beyond.
+    The square makes one high jump worth more than many low ones."""
     relative: float = 0.0
     """Paid in full at the wanted speed, less by the error relative to it; a far goal is the speed that leads there.
     In place of `distance` and `speed` where a robot must learn to walk first."""
@@ -84,7 +90,7 @@ class Tracker(eqx.Module):
 
 def slots_of(reach: Reach) -> tuple[str, ...]:
     """Families that a robot of that reach can be commanded in, by index."""
-    return ("goal", "velocity") if reach.pitch is None else ("goal", "velocity", "stand")
+    return tuple(reach.limits)
 
 
 def relative(subgoal: Subgoal, x: Float[AnyArray, "*batch"], pitch: Float[AnyArray, "*batch"]) -> Command:
@@ -98,7 +104,7 @@ def after(command: Command, motion: Motion) -> Command:
 
 
 def of_slot(slot: Int[AnyArray, "*batch"], x: Float[AnyArray, "*batch"], pitch: Float[AnyArray, "*batch"]):
-    """What a slot is about, [*batch]: x [m] for goals, pitch [rad] for stands, 0 for speeds; of NumPy or JAX."""
+    """What a slot is about, [*batch]: x [m] for goals, pitch [rad] for stands, else 0; of NumPy or JAX."""
     return (slot == GOAL) * x + (slot == STAND) * pitch
 
 
@@ -107,13 +113,15 @@ def tracker_observation(
 ) -> Float[AnyArray, "*batch feature"]:
     """Joint state and command, what is to be reached on three scales so that centimetres count as metres do."""
     far, (slowest, fastest) = MARGIN * reach.distance, (MARGIN * limit for limit in reach.speed)
-    is_slot = [(command.slot == slot).astype(joints.dtype) for slot in range(len(slots_of(reach)))]
-    ahead = is_slot[0] * jnp.clip(command.value, -far, far)
-    speed = is_slot[1] * jnp.clip(command.value, slowest, fastest)
-    features = [*is_slot, ahead / far, jnp.tanh(2 * ahead), jnp.tanh(10 * ahead), speed]
+    is_slot = {name: (command.slot == family_index(name)).astype(joints.dtype) for name in slots_of(reach)}
+    ahead = is_slot["goal"] * jnp.clip(command.value, -far, far)
+    speed = is_slot["velocity"] * jnp.clip(command.value, slowest, fastest)
+    features = [*is_slot.values(), ahead / far, jnp.tanh(2 * ahead), jnp.tanh(10 * ahead), speed]
     if reach.pitch is not None:
-        turn = is_slot[STAND] * command.value
+        turn = is_slot["stand"] * command.value
         features += [turn, jnp.tanh(2 * turn), jnp.tanh(10 * turn)]
+    if reach.jump is not None:
+        features.append(is_slot["jump"] * jnp.clip(command.value, 0.0, MARGIN * reach.jump[1]))
     return jnp.concatenate([joints, jnp.stack(features, axis=-1)], axis=-1)
 
 
@@ -132,7 +140,7 @@ def tracker_reward(
     """
     left = after(command, motion).value
     miss = jnp.abs(left)
-    is_goal, is_stand = command.slot == GOAL, command.slot == STAND
+    is_goal, is_stand, is_jump = (command.slot == slot for slot in (GOAL, STAND, JUMP))
     arrival = weights.arrival * 0.1 / (0.1 + miss)
     if weights.relative:
         slowest, fastest = reach.speed
@@ -144,6 +152,10 @@ def tracker_reward(
         goal = arrival - weights.distance * miss
         moving = jnp.where(is_goal, goal, -weights.speed * jnp.abs(command.value - motion.pace))
     stand = arrival - weights.turn * miss
+    share = motion.rise / control_dt / jnp.maximum(command.value, LOWEST_JUMP)
+    wanted_at_all = jnp.clip(command.value / LOWEST_JUMP, 0.0, 1.0)
+    jump = wanted_at_all * jnp.clip(share, 0.0, 1.0) ** 2 - weights.overshoot * jnp.maximum(share - 1.0, 0.0)
+    moving = jnp.where(is_jump, jump, moving)
     posture = jnp.where(is_stand, 0.0, weights.upright * (1 - jnp.cos(motion.pitch)))
     posture = posture + weights.energy * jnp.mean(action**2, axis=-1)
     alive = weights.alive * (1.0 - motion.fell)

@@ -12,14 +12,12 @@ from jaxtyping import Float, Int
 from rebody.agents.rollout import Episodes
 from rebody.evaluation.summary import summarise
 from rebody.store.files import written_whole
-from rebody.tasks import FAMILIES
-from rebody.tasks.figures import final_error, final_squared_error, ripple
+from rebody.tasks import FAMILIES, family_index
+from rebody.tasks.figures import fastest_rise, final_error, final_squared_error, ripple
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import DECISION_DT, AnyArray, Task
 
 VERSION = 1
-JUMP_WINDOW_S = 1.0
-"""The largest vz is taken over this many seconds."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,8 @@ class EpisodeResult:
 
     def reached_of(self, family: str) -> list[float]:
         """The number that a family is about, after each decision [m, m/s, rad]."""
-        return {"goal": self.position_m, "velocity": self.velocity_m_s, "stand": self.pitch_rad}[family]
+        of_each = self.position_m, self.velocity_m_s, self.pitch_rad, self.vz_max_m_s
+        return of_each[family_index(family)]
 
     def to_json(self) -> dict[str, Any]:
         """Under the names of the file format."""
@@ -149,7 +148,7 @@ def episode_results(
                 position_m=_floats(state.x[:, i]),
                 velocity_m_s=_floats(state.vx[:, i]),
                 pitch_rad=_floats(state.pitch[:, i]),
-                vz_max_m_s=_floats(_running_max(np.asarray(state.vz[:, i], float))),
+                vz_max_m_s=_floats(fastest_rise(np.asarray(state.vz[:, i], float))),
                 reward=_floats(episodes.reward[:, i]),
                 active_family=names[np.asarray(tasks.family[:, i])].tolist(),
                 active_target=_floats(tasks.target[:, i]),
@@ -168,12 +167,6 @@ def episode_results(
             )
         )
     return results
-
-
-def _running_max(vz: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
-    steps = round(JUMP_WINDOW_S / DECISION_DT)
-    padded = np.concatenate([np.full(steps - 1, -np.inf), vz])
-    return np.lib.stride_tricks.sliding_window_view(padded, steps).max(axis=-1)
 
 
 def _floats(values: Any) -> list[float]:

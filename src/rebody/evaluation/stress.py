@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.control.tracker import Tracker
-from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.tasks import GOAL, family_index
 from rebody.types import Subgoal
 
 SECONDS = 20.0
@@ -67,13 +67,9 @@ def stress(tracker: Tracker, spec: RobotSpec, episodes: int, seed: int = 0) -> S
 
 def _subgoals(tracker: Tracker, batch: RobotBatch, rng: np.random.Generator) -> Subgoal:
     """One of each robot, within reach of where it is."""
-    reach, size = tracker.reach, batch.size
-    values: list[Float[np.ndarray, " episode"]] = [
-        batch.x + rng.uniform(-reach.distance, reach.distance, size),
-        rng.uniform(*reach.speed, size),
-    ]
-    if reach.pitch is not None:
-        values.append(rng.uniform(*reach.pitch, size))
-    assert (GOAL, VELOCITY, STAND) == (0, 1, 2)
-    slot = rng.integers(len(values), size=size).astype(np.int32)
-    return Subgoal(slot, np.stack(values)[slot, np.arange(size)].astype(np.float32))
+    limits, size = tracker.reach.limits, batch.size
+    values = np.stack([rng.uniform(*ends, size) for ends in limits.values()])
+    slots = np.array([family_index(name) for name in limits], np.int32)
+    which = rng.integers(len(slots), size=size)
+    slot, value = slots[which], values[which, np.arange(size)]
+    return Subgoal(slot, np.where(slot == GOAL, batch.x + value, value).astype(np.float32))

@@ -11,7 +11,7 @@ from rebody.evaluation.results import EpisodeResult, Results
 from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TASKS, TRUTH, figure
 from rebody.tasks import FAMILIES, family_index
 
-FAMILY_COLOURS = (MOTION, BELIEF, IDLE)
+FAMILY_COLOURS = (MOTION, BELIEF, IDLE, ORACLE)
 
 
 def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) -> None:

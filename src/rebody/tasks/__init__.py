@@ -3,6 +3,7 @@
 from rebody.tasks.families import (
     FAMILIES,
     GOAL,
+    JUMP,
     STAND,
     VELOCITY,
     Family,
@@ -18,6 +19,7 @@ from rebody.tasks.sampling import BaseTask, TaskDistribution
 __all__ = [
     "FAMILIES",
     "GOAL",
+    "JUMP",
     "STAND",
     "VELOCITY",
     "BaseTask",

@@ -33,8 +33,9 @@ FAMILIES = (
     Family("goal", "m", floor=1.0, tolerance=0.25, field="x"),
     Family("velocity", "m/s", floor=0.5, tolerance=0.25, field="vx"),
     Family("stand", "rad", floor=0.3, tolerance=0.2, field="pitch"),
+    Family("jump", "m/s", floor=0.5, tolerance=0.4, field="vz"),
 )
-GOAL, VELOCITY, STAND = range(3)
+GOAL, VELOCITY, STAND, JUMP = range(4)
 
 
 def family_names() -> tuple[str, ...]:

@@ -3,25 +3,29 @@
 import numpy as np
 from jaxtyping import Float
 
-from rebody.tasks.families import FAMILIES, VELOCITY, family_index
+from rebody.tasks.families import FAMILIES, JUMP, VELOCITY, family_index
 from rebody.types import DECISION_DT, GlobalState, Task
 
 LAST_S = 2.0
 """The final error is a mean over this many seconds at the end."""
 MEAN_S = 1.0
 """Velocities are judged by the mean over this many seconds."""
+JUMP_S = 1.0
+"""Jumps are judged by the largest vertical speed of this many seconds: nobody can hold one."""
 
 Series = Float[np.ndarray, "time *episode"]
 
 
 def final_error(task: Task, state: GlobalState, start: float = 0.0) -> Float[np.ndarray, "*episode"]:
-    """Mean over the last 2 s of |y - target| [m, m/s, rad]; a velocity is the displacement over 1 s.
+    """Mean over the last 2 s of |y - target| [m, m/s, rad]; a velocity is the displacement over 1 s, a jump the largest
+    vertical speed of 1 s.
 
     `task` is the last one, [*episode]; `state` that after each decision, [time, *episode]; `start` is x before
     the first [m].
     """
     judged = [np.asarray(getattr(state, family.field), float) for family in FAMILIES]
     judged[VELOCITY] = mean_velocity(np.asarray(state.x, float), start)
+    judged[JUMP] = fastest_rise(np.asarray(state.vz, float))
     last = round(LAST_S / DECISION_DT)
     return np.abs(_of_family(task, judged)[-last:] - task.target).mean(axis=0)
 
@@ -29,6 +33,7 @@ def final_error(task: Task, state: GlobalState, start: float = 0.0) -> Float[np.
 def final_squared_error(task: Task, state: GlobalState) -> Float[np.ndarray, "*episode"]:
     """Squared error at the last decision [m^2, (m/s)^2, rad^2], to compare with ReMAP."""
     achieved = [np.asarray(getattr(state, family.field), float)[-1:] for family in FAMILIES]
+    achieved[JUMP] = fastest_rise(np.asarray(state.vz, float))[-1:]
     return (_of_family(task, achieved)[-1] - task.target) ** 2
 
 
@@ -55,3 +60,10 @@ def mean_velocity(position: Series, start: float = 0.0) -> Series:
     steps = round(MEAN_S / DECISION_DT)
     before = np.concatenate([np.full((steps, *position.shape[1:]), start), position])[: len(position)]
     return (position - before) / MEAN_S
+
+
+def fastest_rise(vz: Series) -> Series:
+    """The largest vertical speed of the last second [m/s]."""
+    steps = round(JUMP_S / DECISION_DT)
+    padded = np.concatenate([np.full((steps - 1, *vz.shape[1:]), -np.inf), vz])
+    return np.lib.stride_tricks.sliding_window_view(padded, steps, axis=0).max(axis=-1)

@@ -29,9 +29,13 @@ def tasks_within(module: Inference, reach: Reach) -> TaskDistribution:
 
 
 def within_reach(target_ranges: Mapping[str, tuple[float, float]], reach: Reach) -> TaskDistribution:
-    """Tasks of families with these ranges, but no speed or pitch that the robot does not reach."""
-    limits = {"velocity": reach.speed, "stand": reach.pitch}
-    ends = [(name, *ends, *(limits.get(name) or ends)) for name, ends in target_ranges.items()]
+    """Tasks of families with these ranges, but no speed or pitch that the robot does not reach; goals may lie farther
+    off than what its tracker is shown.
+    """
+    ends = [
+        (name, *ends, *(ends if name == "goal" else reach.limits.get(name, ends)))
+        for name, ends in target_ranges.items()
+    ]
     return TaskDistribution(tuple(BaseTask(name, max(low, a), min(high, b)) for name, low, high, a, b in ends))
 
 

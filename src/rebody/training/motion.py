@@ -12,10 +12,11 @@ from rebody.types import Subgoal, Task
 
 def motion_of(batch: RobotBatch, before: Float[np.ndarray, "robot nq"]) -> Motion:
     """What the control step did that began with the joint positions `before`."""
-    x, _, pitch = batch.spec.root_addresses
+    x, z, pitch = batch.spec.root_addresses
     moved = (batch.qpos - before).astype(np.float32)
     pitch_now = batch.spec.pitch(batch.qpos).astype(np.float32)
-    return Motion(moved[:, x], moved[:, pitch], pitch_now, batch.pace.astype(np.float32), batch.fallen)
+    pace = batch.pace.astype(np.float32)
+    return Motion(moved[:, x], moved[:, pitch], pitch_now, pace, batch.fallen, moved[:, z])
 
 
 def told_reward(

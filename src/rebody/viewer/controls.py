@@ -73,7 +73,9 @@ class Controls:
         self._status = gui.add_html("")
         with gui.add_folder("Hidden task"):
             self._family = gui.add_dropdown(
-                "Kind", family_names(), hint="goal: reach a place; velocity: run; stand: hold a pitch"
+                "Kind",
+                family_names(),
+                hint="goal: reach a place; velocity: run; stand: hold a pitch; jump: leave the floor",
             )
             self._target = gui.add_slider("Target", 0.0, 1.0, 0.1, 0.0)
             self._give = gui.add_button("Change the task now", icon=viser.Icon.TARGET)

@@ -16,7 +16,12 @@ Series = tuple[Float[np.ndarray, " time"], ...]
 FONT = "11px system-ui, sans-serif"
 REACHED_PX, PROBABILITY_PX, PADDING = 135, 88, (6, 12, 0, 0)
 GOAL_NAME = FAMILIES[GOAL].name
-QUANTITIES = {"goal": "position x [m]", "velocity": "velocity [m/s]", "stand": "pitch [rad]"}
+QUANTITIES = {
+    "goal": "position x [m]",
+    "velocity": "velocity [m/s]",
+    "stand": "pitch [rad]",
+    "jump": "vertical speed [m/s]",
+}
 """By family: what it is about."""
 BEHIND = (3, 3)
 """Dashes of a line that is about negative targets [pixels]."""

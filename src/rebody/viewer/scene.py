@@ -9,7 +9,7 @@ import viser
 from jaxtyping import Float
 from mjviser import ViserMujocoScene
 
-from rebody.tasks import FAMILIES, GOAL, STAND, VELOCITY, family_index
+from rebody.tasks import FAMILIES, GOAL, JUMP, STAND, VELOCITY, family_index
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import colours
 from rebody.viewer.session import Moment
@@ -98,6 +98,8 @@ def _arrow(family: int, target: float, x: float) -> tuple[Float[np.ndarray, " 3"
     start = np.zeros(3)
     if family == VELOCITY:
         return start, np.array([ARROW_M * target, 0.0, 0.0])
+    if family == JUMP:
+        return start, np.array([0.0, 0.0, ARROW_M * target])
     if family == STAND:
         return start, np.array([math.sin(target), 0.0, math.cos(target)])
     side = math.copysign(1.0, target - x)

@@ -23,7 +23,8 @@ GUIDE = f"""
 **In the middle.** The robot; the view follows it along *x*, drag to turn, scroll to zoom. Poles mark goals [m], arrows
 speeds [m/s], or point to a goal that is farther away than the picture shows.
 
-**Black, dashed: the hidden task.** Reach a position (*goal*), run at a speed (*velocity*), or hold a pitch (*stand*).
+**Black, dashed: the hidden task.** Reach a position (*goal*), run at a speed (*velocity*), hold a pitch (*stand*), or
+leave the floor at a speed (*jump*).
 
 **Red: the belief**, as a linear probe reads it from the module's latent, and how sure it is of the kind. It begins with
 a guess.

@@ -8,7 +8,7 @@ import pytest
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import MassDamper
 from rebody.control.tracker import MARGIN
-from rebody.tasks import GOAL, STAND, VELOCITY, family_index, family_names
+from rebody.tasks import GOAL, JUMP, STAND, VELOCITY, family_index, family_names
 from rebody.training.tracker.commands import CommandDistribution, ToyGuide, _scripted_action
 from rebody.types import GlobalState, Task
 
@@ -55,7 +55,7 @@ def test_a_narrower_range_of_speeds_leaves_the_rest_as_it_is():
 
 @pytest.mark.parametrize("name", family_names())
 def test_a_network_of_one_slot_is_told_nothing_else(name):
-    reach = Reach(speed=(-1.0, 3.0), distance=4.0, pitch=(-0.5, 0.5))
+    reach = Reach(speed=(-1.0, 3.0), distance=4.0, pitch=(-0.5, 0.5), jump=(1.0, 2.0))
     command = CommandDistribution(only=name).sample(jax.random.key(0), jnp.zeros(1000), reach)
     assert set(np.asarray(command.slot)) == {family_index(name)}
     assert len(np.unique(command.value)) > 800
@@ -129,6 +129,15 @@ def test_a_robot_that_stands_is_asked_to_in_a_third_of_its_commands(lopsided):
     _, command = lopsided
     for slot in (GOAL, VELOCITY, STAND):
         assert np.mean(command.slot == slot) == pytest.approx(1 / 3, abs=ROUGHLY)
+
+
+def test_jumps_are_asked_for_within_reach_and_a_little_beyond():
+    reach = Reach(speed=(-1.0, 3.0), jump=(1.0, 2.0))
+    command = CommandDistribution(zero_share=0.2).sample(jax.random.key(0), np.zeros(DRAWN), reach)
+    asked = np.asarray(command.value)[np.asarray(command.slot) == JUMP]
+    assert len(asked) / DRAWN == pytest.approx(1 / 3, abs=ROUGHLY)
+    assert np.mean(asked == 0) == pytest.approx(0.2, abs=2 * ROUGHLY)
+    assert (asked[asked != 0].min(), asked.max()) == pytest.approx((1.0 / MARGIN, 2.0 * MARGIN), abs=0.01)
 
 
 def test_a_wanted_pitch_does_not_depend_on_the_robots_own(lopsided):

@@ -115,6 +115,7 @@ def relabelled(config):
             pitch=rng.uniform(-3, 3, size).astype(np.float32),
             pace=rng.normal(0, 2, size).astype(np.float32),
             fell=rng.random(size) < 0.1,
+            rise=rng.normal(0, 0.1, size).astype(np.float32),
         ),
         command=Command(
             rng.integers(GOAL, VELOCITY + 1, size).astype(np.int32), rng.uniform(-3, 3, size).astype(np.float32)

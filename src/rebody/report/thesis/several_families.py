@@ -13,7 +13,7 @@ from rebody.evaluation.evaluate import Trial
 from rebody.report.style import BELIEF, MOTION, ORACLE, TRUTH, figure
 from rebody.report.thesis.data import Data, split, training_log, trajectories
 from rebody.report.thesis.panels import caption, draw_curve
-from rebody.tasks import GOAL, STAND, VELOCITY, base_task
+from rebody.tasks import GOAL, JUMP, STAND, VELOCITY, base_task
 from rebody.tasks.task_file import TaskSpec
 from rebody.training.inference import PRESETS, train_inference
 from rebody.types import Task
@@ -26,12 +26,14 @@ BASE_TASKS = {
     2 * VELOCITY: ("run backward", "#4f9a6b"),
     2 * STAND + 1: ("stand, pitch above 0", "#7d4e9e"),
     2 * STAND: ("stand, pitch below 0", "#5a5a5a"),
+    2 * JUMP + 1: ("jump", "#c2557f"),
 }
 """Name and colour by the number that `base_task` gives."""
 SERIES = {
     GOAL: ("position_m", "x [m]"),
     VELOCITY: ("velocity_m_s", "velocity [m/s]"),
     STAND: ("pitch_rad", "pitch [rad]"),
+    JUMP: ("vz_max_m_s", "largest vertical speed of 1 s [m/s]"),
 }
 """Of each family: what is to reach the target, and its label."""
 EPISODES = 12
@@ -117,10 +119,10 @@ def in_plane(latents: Latents, projection: Callable[[np.ndarray], np.ndarray]) -
 
 def tasks_of_each_kind(reach: Reach | None = None, preset: str = "goal-velocity") -> list[TaskSpec]:
     """Evenly spaced over each base task, as far as a body reaches."""
-    limits = {"velocity": reach.speed, "stand": reach.pitch} if reach else {}
+    limits = reach.limits if reach else {}
     specs = []
     for task in PRESETS[preset]().tasks.base_tasks:
-        low, high = limits.get(task.family) or (-np.inf, np.inf)
+        low, high = (-np.inf, np.inf) if task.family == "goal" else limits.get(task.family, (-np.inf, np.inf))
         targets = np.linspace(max(task.low, low), min(task.high, high), EPISODES)
         specs += [TaskSpec(task.family, float(target)) for target in targets]
     return specs

@@ -117,6 +117,18 @@ def goal_velocity_stand() -> MetaConfig:
     )
 
 
+def goal_velocity_jump() -> MetaConfig:
+    """`goal-velocity`, or leave the floor at a hidden vertical speed, on the full toy (thesis B.2)."""
+    base = goal_velocity_stand()
+    return replace(
+        base,
+        tasks=TaskDistribution((*goal_velocity().tasks.base_tasks, BaseTask("jump", 1.5, 3.0))),
+        inference=replace(base.inference, fields=("x", "vx", "vz"), scales=(10.0, 3.0, 3.0)),
+        policy_fields=("vx", "z", "vz"),
+        policy_scales=(3.0, 0.5, 3.0),
+    )
+
+
 def _noisy(variance: float) -> MetaConfig:
     calm = Randomisation(ripple_amplitude=0.0, pitch_ripple=0.0, lag=0.0, gain=(1.0, 1.0))
     return replace(goal_velocity(), randomisation=calm, observation_noise=variance)
@@ -135,4 +147,5 @@ PRESETS: dict[str, Callable[[], MetaConfig]] = {
     "goal-velocity-noise-0.1": goal_velocity_noise_01,
     "goal-velocity-noise-0.2": goal_velocity_noise_02,
     "goal-velocity-stand": goal_velocity_stand,
+    "goal-velocity-jump": goal_velocity_jump,
 }

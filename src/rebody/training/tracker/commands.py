@@ -11,10 +11,10 @@ from jaxtyping import Float, Int, PRNGKeyArray
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import MassDamper, ToyState
 from rebody.control.tracker import MARGIN, Command, slots_of
-from rebody.tasks import GOAL, STAND, family_index
+from rebody.tasks import GOAL, JUMP, STAND, family_index
 from rebody.types import AnyArray, GlobalState, Subgoal, Task
 
-SlotName = Literal["goal", "velocity", "stand"]
+SlotName = Literal["goal", "velocity", "stand", "jump"]
 Share = float | Float[AnyArray, ""]
 """Of a whole, in (0, 1]."""
 
@@ -48,6 +48,8 @@ class CommandDistribution:
         asked = jnp.where(slot == GOAL, goal, speed)
         if reach.pitch is not None:
             asked = jnp.where(slot == STAND, _between(MARGIN * reach.pitch[0], MARGIN * reach.pitch[1], unit), asked)
+        if reach.jump is not None:
+            asked = jnp.where(slot == JUMP, _between(reach.jump[0] / MARGIN, MARGIN * reach.jump[1], unit), asked)
         still = jax.random.bernoulli(keys[5], self.zero_share, shape)
         here = jnp.where(slot == STAND, pitch, 0.0)
         return Command(slot, jnp.where(still, 0.0, asked) - here)
@@ -55,7 +57,8 @@ class CommandDistribution:
     def _slots(self, key: PRNGKeyArray, shape: tuple[int, ...], reach: Reach) -> Int[AnyArray, "*batch"]:
         if self.only is not None:
             return jnp.full(shape, family_index(self.only))
-        return jax.random.randint(key, shape, GOAL, len(slots_of(reach)))
+        slots = jnp.asarray([family_index(name) for name in slots_of(reach)])
+        return slots[jax.random.randint(key, shape, 0, len(slots))]
 
 
 def _between(low: float, high: float, unit: Float[AnyArray, "*batch"]) -> Float[AnyArray, "*batch"]:

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
 from rebody.bodies import RobotBatch
 from rebody.control.tracker import Command, of_slot
-from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.tasks import GOAL, VELOCITY
 from rebody.training.tracker.commands import Share, ToyGuide
 from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.schedule import REACHED, Schedule
@@ -67,7 +67,7 @@ def renew(
         value=(here + drawn.value).astype(np.float32),
         steps_left=rng.integers(shortest, longest + 1, config.robots).astype(np.int32),
         age=orders.age.copy(),
-        guided=(rng.random(config.robots) < config.guided_share) & (drawn.slot != STAND),
+        guided=(rng.random(config.robots) < config.guided_share) & np.isin(drawn.slot, (GOAL, VELOCITY)),
         # a toy's own goals lie farther off than what a tracker is shown
         guide_target=(here + np.where(drawn.slot == GOAL, 2.0, 1.0) * drawn.value).astype(np.float32),
         guide_horizon=rng.integers(1, config.max_horizon + 1, config.robots).astype(np.int32),

@@ -14,7 +14,7 @@ from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.robot import Reach
 from rebody.control.tracker import Tracker
 from rebody.store import save_artifact
-from rebody.tasks import FAMILIES, GOAL, VELOCITY
+from rebody.tasks import FAMILIES, GOAL, VELOCITY, family_index
 from rebody.tasks.figures import final_error
 from rebody.training.card import card
 from rebody.training.run import Run
@@ -31,10 +31,11 @@ SLOWEST = 0.3
 def measure(tracker: Tracker, spec: RobotSpec) -> dict[str, float]:
     """Errors on held-out commands of each slot within reach, speed at a zero command, share that fell."""
     rng, reach = np.random.default_rng(2**31 - 1), tracker.reach
-    values = [rng.uniform(-reach.distance, reach.distance, COMMANDS), speeds_within(reach, COMMANDS, rng)]
-    if reach.pitch is not None:
-        values.append(rng.uniform(*reach.pitch, COMMANDS))
-    slot = np.repeat(np.arange(len(values)), COMMANDS)
+    values = [
+        speeds_within(reach, COMMANDS, rng) if name == "velocity" else rng.uniform(*ends, COMMANDS)
+        for name, ends in reach.limits.items()
+    ]
+    slot = np.repeat([family_index(name) for name in reach.limits], COMMANDS)
     zeros = np.zeros(COMMANDS // 4)
     command = Subgoal(
         np.concatenate([slot, np.full(len(zeros), GOAL), np.full(len(zeros), VELOCITY)]).astype(np.int32),
@@ -44,8 +45,8 @@ def measure(tracker: Tracker, spec: RobotSpec) -> dict[str, float]:
     states, fell = run_robots(spec, len(command.slot), lambda batch: follow(controller, batch, command))
     errors = final_error(Task(command.slot, command.value), states)
     figures = {}
-    for index, name in enumerate(tracker.slots):
-        of_slot = errors[: len(slot)][slot == index]
+    for name in tracker.slots:
+        of_slot = errors[: len(slot)][slot == family_index(name)]
         figures[f"{name} median"] = float(np.median(of_slot))
         figures[f"{name} p95"] = float(np.percentile(of_slot, 95))
     figures["zero speed"] = float(np.abs(states.vx[-10:, len(slot) :]).mean())  # in the last second
@@ -97,11 +98,12 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
     asked = {
         "goal": f"goals to +-{reach.distance:g} m",
         "velocity": f"speeds {_ends(reach.speed)} m/s beyond +-{SLOWEST:g}",
-        "stand": f"pitches {_ends(reach.pitch)} rad" if reach.pitch else "",
+        "stand": f"pitches {_ends(reach.pitch)} rad",
+        "jump": f"jumps {_ends(reach.jump)} m/s",
     }
     rows = {
-        f"{asked[name]}, {figure}, {condition}": f"{figures[f'{name} {key}']:.4f} {FAMILIES[index].unit}"
-        for index, name in enumerate(tracker.slots)
+        f"{asked[name]}, {figure}, {condition}": f"{figures[f'{name} {key}']:.4f} {FAMILIES[family_index(name)].unit}"
+        for name in tracker.slots
         for key, figure in (("median", "median error"), ("p95", "95th percentile"))
     }
     rows |= {
@@ -124,5 +126,5 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
     )
 
 
-def _ends(ends: tuple[float, float]) -> str:
-    return f"[{ends[0]:g}, {ends[1]:g}]"
+def _ends(ends: tuple[float, float] | None) -> str:
+    return f"[{ends[0]:g}, {ends[1]:g}]" if ends else ""

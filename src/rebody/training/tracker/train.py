@@ -203,7 +203,7 @@ def initial_state(
             joints=np.zeros((rows, joints.shape[-1]), np.float32),
             action=np.zeros((rows, spec.model.nu), np.float32),
             next_joints=np.zeros((rows, joints.shape[-1]), np.float32),
-            motion=Motion(moved.copy(), moved.copy(), moved.copy(), moved, np.zeros(rows, bool)),
+            motion=Motion(moved.copy(), moved.copy(), moved.copy(), moved.copy(), np.zeros(rows, bool), moved),
             command=Command(np.zeros(rows, np.int32), np.zeros(rows, np.float32)),
         ),
         orders=no_orders(config.robots),
