@@ -9,6 +9,7 @@ import pytest
 from rebody.agents.parts import load_inference
 from rebody.bodies.toys import FullToy, MassDamper, PositionToy
 from rebody.cli.main import run
+from rebody.inference.module import BASE_TASKS
 from rebody.store import load_artifact, save_artifact
 from rebody.tasks import GOAL, STAND, VELOCITY
 
@@ -239,7 +240,7 @@ def test_a_module_of_the_full_toy_is_what_was_asked_for(full_module):
     assert loaded.contract.target_ranges.keys() == {"goal", "velocity", "stand"}
     assert loaded.contract.window is module.encoder.window is None
     assert (module.encoder.latent, module.encoder.kinds, module.decoder.kinds) == (5, 2, 2)
-    assert module.labeller.weights[-1].shape == (5, 6)
+    assert module.labeller.weights[-1].shape == (5, BASE_TASKS)
     assert loaded.parts.mixture.mean.shape == (6, 2)
     assert loaded.parts.mixture.active.any()
     assert np.abs(loaded.parts.probe.target_weights).max(axis=0).min() > 0
