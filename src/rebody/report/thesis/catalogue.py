@@ -210,11 +210,11 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.21",
-            "a high level learned on the walker: goals and speeds",
+            "high levels learned on walker and hopper: goals and speeds",
             shipped("6.21"),
             lambda _: retrained.on_robots(retrained.BALANCING),
             partial(retrained.draw_ways, retrained.BALANCING),
-            "A high-level policy that was learned on a robot that has to balance, `goal-velocity` frozen, from x = 0 "
+            "High-level policies that were learned on robots that have to balance, `goal-velocity` frozen, from x = 0 "
             "at rest. Left: goals, right: speeds; dotted: what was hidden.",
         ),
         ThesisFigure(

@@ -6,7 +6,7 @@ from pathlib import Path
 from rebody.agents.parts import load_high_level, load_inference, load_tracker
 from rebody.bodies import load_robot
 from rebody.evaluation.evaluate import Trial
-from rebody.report.style import BELIEF, MOTION, ORACLE, TRUTH, figure
+from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TRUTH, figure
 from rebody.report.thesis.data import Data, join, split, training_log, trajectories
 from rebody.report.thesis.panels import caption, draw_curve
 from rebody.report.thesis.several_families import draw_ways_of_each, tasks_of_each_kind, ways_panels
@@ -17,7 +17,7 @@ Policies = Mapping[tuple[str, str], str]
 """Modules and robots of policies that ship, and their colours."""
 
 ON_CHEETAH: Policies = {("goal-velocity", "cheetah"): MOTION, ("goal-velocity-noise-0", "cheetah"): BELIEF}
-BALANCING: Policies = {("goal-velocity", "walker"): TRUTH}
+BALANCING: Policies = {("goal-velocity", "walker"): TRUTH, ("goal-velocity", "hopper"): IDLE}
 STANDING = ("goal-velocity-stand", "cheetah")
 POLICIES: Policies = {**ON_CHEETAH, **BALANCING, STANDING: ORACLE}
 
