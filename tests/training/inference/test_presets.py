@@ -13,7 +13,7 @@ from rebody.tasks import FAMILIES
 from rebody.training.inference import PRESETS
 
 MOVES = {"mass-damper": {"x", "vx"}, "position": {"x", "vx"}, "full": {"x", "z", "pitch", "vx", "vz", "pitch_rate"}}
-SHOWN_BY = {"goal": "x", "velocity": "x", "stand": "pitch"}
+SHOWN_BY = {"goal": "x", "velocity": "x", "stand": "pitch", "jump": "vz"}
 """The field without which a family's reward could not be understood."""
 
 
@@ -43,6 +43,8 @@ def test_tasks_can_be_done_by_the_toy(preset):
             assert far <= toy.max_force / toy.damping
         if family == "stand":
             assert far < toy.max_pitch
+        if family == "jump":  # off the floor within a decision
+            assert far <= 0.1 * (toy.max_lift / toy.mass - toy.gravity)
         if family == "goal":  # episodes begin on either side of every goal
             assert far <= preset.start[0]
 
