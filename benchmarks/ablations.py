@@ -41,18 +41,18 @@ def main() -> None:
     rows = {}
     for name in arguments.only:
         out = arguments.out / name.replace(" ", "-").replace("=", "")
-        train(VARIANTS[name], out)
+        train(["inference", "--preset", "goal-velocity", *BUDGET.split(), *VARIANTS[name].split()], out)
         minutes = json.loads((out / "config.json").read_text())["training"]["wall_s"] / 60
         rows[name] = {"training [min]": minutes} | figures_of(str(out))
     show(rows)
 
 
-def train(flags: str, out: Path) -> None:
-    """Train a variant, or go on with it."""
+def train(arguments: list[str], out: Path) -> None:
+    """`rebody train` with these arguments, or go on with it; nothing if it is done."""
     if (out / "card.md").exists():
         return
     rebody = Path(sys.executable).with_name("rebody")
-    command = [rebody, "train", "inference", "--preset", "goal-velocity", "--out", out, *BUDGET.split(), *flags.split()]
+    command = [rebody, "train", *arguments, "--out", out]
     if (out / "checkpoint").exists():
         command.append("--resume")
     subprocess.run([str(part) for part in command], check=True)

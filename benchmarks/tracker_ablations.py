@@ -3,14 +3,15 @@
     .venv/bin/python benchmarks/tracker_ablations.py [--out runs/tracker-ablations] [--only NAME ...]
 
 Every run gets a quarter of the iterations of the preset; one that is already there is not trained again. "One network
-per slot" are three runs of one slot each, so three times the steps and updates. Errors are those of the runs' cards.
+per slot" are three runs of one slot each, so three times the steps and updates. Errors are those that
+the runs' cards give.
 """
 
 import argparse
 import json
-import subprocess
-import sys
 from pathlib import Path
+
+from ablations import train
 
 from rebody.agents.parts import load_tracker
 from rebody.bodies import load_robot
@@ -53,12 +54,7 @@ def figures_of_slot(out: Path, slot: str) -> dict[str, float]:
 
 def figures_of(out: Path, flags: str) -> dict[str, float]:
     """Train a variant, or go on with it, and measure it."""
-    if not (out / "card.md").exists():
-        rebody = Path(sys.executable).with_name("rebody")
-        command = [rebody, "train", "tracker", "--robot", ROBOT, "--out", out, *BUDGET.split(), *flags.split()]
-        if (out / "checkpoint").exists():
-            command.append("--resume")
-        subprocess.run([str(part) for part in command], check=True)
+    train(["tracker", "--robot", ROBOT, *BUDGET.split(), *flags.split()], out)
     minutes = json.loads((out / "config.json").read_text())["training"]["wall_s"] / 60
     return {"training [min]": minutes} | measure(load_tracker(str(out)).tracker, load_robot(ROBOT))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rebody.bodies import RobotBatch, load_robot
-from rebody.bodies.robot import wrap_angle
+from rebody.bodies.robot import Reach, wrap_angle
 from rebody.errors import RebodyError
 
 STEPS = 60
@@ -58,6 +58,20 @@ def test_moves_bit_for_bit_as_gymnasiums(name, theirs, tmp_path, monkeypatch):
         batch.step(action)
         np.testing.assert_array_equal(batch.qpos[0], env.data.qpos)
         np.testing.assert_array_equal(batch.qvel[0], env.data.qvel)
+
+
+@pytest.mark.parametrize(
+    ("family", "asked", "reached"),
+    [
+        ("velocity", (-3.0, 3.0), (-1.0, 2.0)),
+        ("velocity", (0.5, 1.5), (0.5, 1.5)),
+        ("goal", (-15.0, 15.0), (-15.0, 15.0)),  # farther than a tracker is shown
+        ("jump", (0.5, 3.0), (1.0, 2.0)),
+        ("stand", (-1.0, 1.0), (-1.0, 1.0)),  # it has no such slot to say
+    ],
+)
+def test_targets_are_cut_to_what_a_robot_reaches(family, asked, reached):
+    assert Reach(speed=(-1.0, 2.0), jump=(1.0, 2.0)).within(family, *asked) == reached
 
 
 def test_threads_do_not_change_a_bit(cheetah):

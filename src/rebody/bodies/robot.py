@@ -71,6 +71,13 @@ class Reach:
         }
         return {name: limits for name, limits in ends.items() if limits is not None}
 
+    def within(self, family: str, low: float, high: float) -> tuple[float, float]:
+        """What it reaches of a family's targets from `low` to `high`; goals may lie farther off than `distance`."""
+        if family == "goal" or family not in self.limits:
+            return low, high
+        lowest, highest = self.limits[family]
+        return max(low, lowest), min(high, highest)
+
 
 @dataclass(frozen=True)
 class RobotSpec:

@@ -29,14 +29,8 @@ def tasks_within(module: Inference, reach: Reach) -> TaskDistribution:
 
 
 def within_reach(target_ranges: Mapping[str, tuple[float, float]], reach: Reach) -> TaskDistribution:
-    """Tasks of families with these ranges, but no speed or pitch that the robot does not reach; goals may lie farther
-    off than what its tracker is shown.
-    """
-    ends = [
-        (name, *ends, *(ends if name == "goal" else reach.limits.get(name, ends)))
-        for name, ends in target_ranges.items()
-    ]
-    return TaskDistribution(tuple(BaseTask(name, max(low, a), min(high, b)) for name, low, high, a, b in ends))
+    """Tasks of families with these ranges, as far as the robot reaches."""
+    return TaskDistribution(tuple(BaseTask(name, *reach.within(name, *ends)) for name, ends in target_ranges.items()))
 
 
 def new_minds(batch: RobotBatch, module: Inference, key: PRNGKeyArray) -> Minds:

@@ -11,7 +11,7 @@ from rebody.agents.belief import Reading
 from rebody.agents.clock import begin, decide
 from rebody.agents.rollout import task_reward
 from rebody.evaluation.evaluate import Trial, check_trial, trial_agent, trial_controller
-from rebody.tasks import FAMILIES, GOAL
+from rebody.tasks import FAMILIES
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, GlobalState
 from rebody.viewer.body import Body, RobotBody, ToyBody
@@ -105,11 +105,8 @@ class Session:
 
 def target_range(trial: Trial, family: str) -> tuple[float, float]:
     """Smallest and largest target that the module has learned and the robot is able to reach (m, m/s, rad, m/s)."""
-    low, high = trial.inference.contract.target_ranges[family]
-    if trial.tracker is None or family == FAMILIES[GOAL].name:
-        return low, high
-    lowest, highest = trial.tracker.tracker.reach.limits[family]
-    return max(low, lowest), min(high, highest)
+    ends = trial.inference.contract.target_ranges[family]
+    return ends if trial.tracker is None else trial.tracker.tracker.reach.within(family, *ends)
 
 
 def fitting(trial: Trial, task: TaskSpec) -> TaskSpec:

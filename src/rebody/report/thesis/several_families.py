@@ -119,11 +119,10 @@ def in_plane(latents: Latents, projection: Callable[[np.ndarray], np.ndarray]) -
 
 def tasks_of_each_kind(reach: Reach | None = None, preset: str = "goal-velocity") -> list[TaskSpec]:
     """Evenly spaced over each base task, as far as a body reaches."""
-    limits = reach.limits if reach else {}
     specs = []
     for task in PRESETS[preset]().tasks.base_tasks:
-        low, high = (-np.inf, np.inf) if task.family == "goal" else limits.get(task.family, (-np.inf, np.inf))
-        targets = np.linspace(max(task.low, low), min(task.high, high), EPISODES)
+        ends = reach.within(task.family, task.low, task.high) if reach else (task.low, task.high)
+        targets = np.linspace(*ends, EPISODES)
         specs += [TaskSpec(task.family, float(target)) for target in targets]
     return specs
 
