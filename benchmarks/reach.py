@@ -1,9 +1,9 @@
-"""What trackers can be told: the error of every speed and pitch, inside and outside of what they were trained for.
+"""What trackers can be told: the error of every speed, pitch and jump, inside and outside of what they trained for.
 
-    .venv/bin/python benchmarks/reach.py [--robots cheetah ...] [--out runs/reach.png]
+    .venv/bin/python benchmarks/reach.py [--trackers tracker-cheetah ...] [--out runs/reach.png]
 
-Told a speed or a pitch for 10 s, 8 starts each. Held is what is missed by no more than the family's tolerance
-(0.25 m/s, 0.2 rad; median of the starts).
+Told a speed, a pitch or a jump for 10 s, 8 starts each. Held is what is missed by no more than the family's tolerance
+(0.25 m/s, 0.2 rad, jumps 0.4 m/s; median of the starts).
 """
 
 import argparse
@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 
 from rebody.agents.controller import TrackerController
-from rebody.agents.parts import load_tracker
+from rebody.agents.parts import LoadedTracker, load_tracker
 from rebody.agents.rollout import follow
 from rebody.bodies import load_robot
 from rebody.report.style import figure
-from rebody.tasks import FAMILIES, STAND, VELOCITY
+from rebody.tasks import FAMILIES, JUMP, STAND, VELOCITY
 from rebody.tasks.figures import final_error
 from rebody.training.tracker.report import run_robots
 from rebody.types import Subgoal, Task
 
-TOLD = {VELOCITY: np.arange(-4.0, 4.05, 0.1), STAND: np.arange(-1.5, 1.55, 0.05)}
+TOLD = {VELOCITY: np.arange(-4.0, 4.05, 0.1), STAND: np.arange(-1.5, 1.55, 0.05), JUMP: np.arange(0.2, 5.05, 0.1)}
 STARTS = 8
 
 Curve = dict[float, float]
@@ -30,17 +30,17 @@ Curve = dict[float, float]
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--robots", nargs="*", default=["cheetah", "hopper", "walker"])
+    parser.add_argument("--trackers", nargs="*", default=["tracker-cheetah", "tracker-hopper", "tracker-walker"])
     parser.add_argument("--out", type=Path, default=Path("runs/reach.png"))
     arguments = parser.parse_args()
-    found = {robot: curves_of(robot) for robot in arguments.robots}
+    found = {name: curves_of(load_tracker(name)) for name in arguments.trackers}
     show(found)
     draw(found, arguments.out)
 
 
-def curves_of(robot: str) -> dict[int, Curve]:
+def curves_of(loaded: LoadedTracker) -> dict[int, Curve]:
     """Of each slot but goals: a far goal is a speed."""
-    spec, tracker = load_robot(robot), load_tracker(f"tracker-{robot}").tracker
+    spec, tracker = load_robot(loaded.robot), loaded.tracker
     controller, curves = TrackerController(tracker, spec.goal_ahead), {}
     for slot, values in TOLD.items():
         if FAMILIES[slot].name not in tracker.slots:
@@ -63,23 +63,24 @@ def held(curve: Curve, tolerance: float) -> list[tuple[float, float]]:
 
 def show(found: dict[str, dict[int, Curve]]) -> None:
     """A Markdown table: what is held beside what was trained for."""
-    print("| robot | slot | trained for | held within the tolerance |\n|---|---|---|---|")
-    for robot, curves in found.items():
-        reach = load_tracker(f"tracker-{robot}").tracker.reach
+    print("| tracker | slot | trained for | held within the tolerance |\n|---|---|---|---|")
+    for name, curves in found.items():
+        limits = load_tracker(name).tracker.reach.limits
         for slot, curve in curves.items():
-            family, trained = FAMILIES[slot], reach.speed if slot == VELOCITY else reach.pitch
+            family, trained = FAMILIES[slot], limits[FAMILIES[slot].name]
             ranges = ", ".join(f"{low:g} to {high:g}" for low, high in held(curve, family.tolerance))
-            print(f"| {robot} | {family.name} [{family.unit}] | {trained[0]:g} to {trained[1]:g} | {ranges} |")
+            print(f"| {name} | {family.name} [{family.unit}] | {trained[0]:g} to {trained[1]:g} | {ranges} |")
 
 
 def draw(found: dict[str, dict[int, Curve]], out: Path) -> None:
-    """A panel per slot, a line per robot."""
-    with figure(out, 1, len(TOLD), size=(11.0, 4.2)) as (_, panels):
-        for axes, slot in zip(panels, TOLD, strict=True):
+    """A panel per slot that a tracker has, a line per tracker."""
+    slots = [slot for slot in TOLD if any(slot in curves for curves in found.values())]
+    with figure(out, 1, len(slots), size=(5.5 * len(slots), 4.2)) as (_, panels):
+        for axes, slot in zip(np.atleast_1d(panels), slots, strict=True):
             family = FAMILIES[slot]
-            for robot, curves in found.items():
+            for name, curves in found.items():
                 if slot in curves:
-                    axes.plot(list(curves[slot]), list(curves[slot].values()), ".-", ms=4, label=robot)
+                    axes.plot(list(curves[slot]), list(curves[slot].values()), ".-", ms=4, label=name)
             axes.axhline(family.tolerance, color="#999999", lw=0.8, ls=":")
             axes.set(
                 xlabel=f"told {family.name} [{family.unit}]", ylabel=f"final error [{family.unit}]", ylim=(0, None)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rebody.errors import RebodyError
-from rebody.tasks import GOAL, STAND, VELOCITY, base_task, family_index, reward
+from rebody.tasks import GOAL, JUMP, STAND, VELOCITY, achieved_by_way_of, base_task, family_index, reward
 from rebody.types import GlobalState, Task
 
 
@@ -39,6 +39,12 @@ def test_a_batch_holds_different_families():
     state = GlobalState(two, zero, zero, two / 2, zero, zero, zero, zero)
     task = Task(np.asarray([GOAL, VELOCITY, STAND]), two)
     np.testing.assert_allclose(reward(task, state, "plain"), [0.0, -2.0, -1.0])
+
+
+def test_a_jump_is_the_fastest_rise_on_the_way_all_else_the_last_state():
+    series = np.array([[1.0, 5.0], [3.0, 9.0], [2.0, 7.0]], np.float32)  # [time, body]
+    states = GlobalState(*([series] * 8))
+    np.testing.assert_array_equal(achieved_by_way_of(np.array([GOAL, JUMP]), states), [2.0, 9.0])
 
 
 def test_front_and_back_of_each_family_are_base_tasks():

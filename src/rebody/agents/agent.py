@@ -13,7 +13,7 @@ from rebody.agents.slots import SlotChooser
 from rebody.bodies.toys import Toy
 from rebody.control.high_level import HighLevelPolicy, TaskCode
 from rebody.control.slot_policy import SlotPolicy
-from rebody.tasks import GOAL, VELOCITY, achieved
+from rebody.tasks import GOAL, VELOCITY, achieved_by_way_of
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task, Transition
 
 
@@ -106,21 +106,19 @@ class ReuseAgent(Agent):
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """The policy's action for a toy; for a robot, where that policy would lead a toy from here."""
         action = self.high_level(state, self.interpret(belief))
-        ahead = self.imagine(state, belief)
         slot = self.slots(belief)
-        return Command(action, Subgoal(slot, achieved(slot, ahead)))
+        return Command(action, Subgoal(slot, achieved_by_way_of(slot, self.imagine(state, belief))))
 
     def imagine(self, state: GlobalState, belief: Belief) -> GlobalState:
-        """Where the nominal toy would be after `horizon` decisions, the belief held fixed."""
+        """Where the nominal toy would be after each of `horizon` decisions, [horizon, *batch], the belief held fixed."""
         key = jax.random.key(0)  # a nominal toy has no noise
         understood = self.interpret(belief)
 
         def step(body, _):
-            action = self.high_level(self.toy.observe(body), understood)
-            return self.toy.step(body, action, key), None
+            body = self.toy.step(body, self.high_level(self.toy.observe(body), understood), key)
+            return body, self.toy.observe(body)
 
-        body, _ = jax.lax.scan(step, self.toy.from_global(state), None, length=self.horizon)
-        return self.toy.observe(body)
+        return jax.lax.scan(step, self.toy.from_global(state), None, length=self.horizon)[1]
 
 
 class ToldAgent(Agent):

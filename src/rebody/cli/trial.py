@@ -77,9 +77,7 @@ class TrialOptions:
             inference=inference,
             tracker=load_tracker(self.tracker or f"tracker-{robot.name}") if robot else None,
             flat=load_flat(self.flat or f"flat-{robot.name}") if robot and self.agent == "flat" else None,
-            scratch=load_scratch(self.scratch or f"scratch-{robot.name}")
-            if robot and self.agent == "scratch"
-            else None,
+            scratch=self._scratch(robot),
             high_level=self._high_level(robot),
             slots=load_slots_of(inference, self.classifier) if bridged else None,
             slots_by=self.slots_by,

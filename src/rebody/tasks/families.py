@@ -4,6 +4,7 @@ import difflib
 from dataclasses import dataclass
 from typing import Literal
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Float, Int
 
@@ -62,6 +63,12 @@ def achieved(family: Int[AnyArray, "*batch"], state: GlobalState) -> Float[AnyAr
     """The number of each state that its family compares with a target, in the family's unit."""
     of_all = state.select(tuple(each.field for each in FAMILIES))
     return jnp.take_along_axis(of_all, family[..., None], axis=-1)[..., 0]
+
+
+def achieved_by_way_of(family: Int[AnyArray, "*batch"], states: GlobalState) -> Float[AnyArray, "*batch"]:
+    """What states in a row, [time, *batch], lead to: the number of the last, of a jump the fastest rise on the way."""
+    last = achieved(family, jax.tree.map(lambda leaf: leaf[-1], states))
+    return jnp.where(family == JUMP, states.vz.max(axis=0), last)
 
 
 def reward(task: Task, state: GlobalState, form: RewardForm) -> Float[AnyArray, "*batch"]:

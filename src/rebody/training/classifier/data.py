@@ -16,7 +16,7 @@ from rebody.agents.rollout import Episodes, rollout_on_toy
 from rebody.agents.slots import OneSlot
 from rebody.bodies.toys import Disturbance, Randomisation, no_disturbance
 from rebody.inference.mixture.padded import MixturePrior
-from rebody.tasks import BaseTask, TaskDistribution, achieved
+from rebody.tasks import BaseTask, TaskDistribution, achieved_by_way_of
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
 DECISIONS = 200
@@ -67,10 +67,14 @@ class TrackingToy(ReuseAgent):
         candidates = jnp.concatenate([steps[:, None] * jnp.eye(actions)[i] for i in range(actions)])
 
         def outcome(action: Float[AnyArray, " action"]) -> Float[AnyArray, "*batch"]:
-            body = self.toy.from_global(state)
             held = jnp.broadcast_to(action, (*state.x.shape, actions))
-            body, _ = jax.lax.scan(lambda b, _: (self.toy.step(b, held, jax.random.key(0)), None), body, length=HOLD)
-            return jnp.abs(achieved(subgoal.slot, self.toy.observe(body)) - subgoal.value)
+
+            def step(body, _):
+                body = self.toy.step(body, held, jax.random.key(0))
+                return body, self.toy.observe(body)
+
+            _, states = jax.lax.scan(step, self.toy.from_global(state), None, length=HOLD)
+            return jnp.abs(achieved_by_way_of(subgoal.slot, states) - subgoal.value)
 
         nearest = jnp.argmin(jax.vmap(outcome)(candidates), axis=0)
         return Command(candidates[nearest], subgoal)
