@@ -112,7 +112,7 @@ def test_log_probability_is_that_of_the_squashed_gaussian():
     action, log_prob = actor.sample(jnp.zeros((20_000, 1)), jax.random.key(1))
     # the mean of 1 / p over the samples within an interval is the length of that interval
     inside = jnp.abs(action[:, 0]) < 0.15
-    assert float(jnp.mean(jnp.where(inside, jnp.exp(-log_prob), 0.0))) == pytest.approx(0.3, rel=0.03)
+    assert float(jnp.mean(jnp.where(inside, jnp.exp(-log_prob[:, 0]), 0.0))) == pytest.approx(0.3, rel=0.03)
 
 
 def small_batch():

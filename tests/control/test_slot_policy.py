@@ -7,7 +7,7 @@ import pytest
 
 from rebody.bodies.robot import Reach
 from rebody.control.sac import Critics, SACBatch, SACConfig, initial_state, update_many
-from rebody.control.slot_policy import SOFTNESS, draw, judge, pool, slots_within, subgoal_of
+from rebody.control.slot_policy import SOFTNESS, draw, judge, pool, slot_sac, slots_within, subgoal_of
 from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.types import GlobalState
 
@@ -47,13 +47,27 @@ def test_while_it_learns_a_slot_is_drawn_by_its_value():
 
 
 def test_judgement_is_the_mean_over_what_may_be_done():
+    """And so is its log-probability: that of a slot, and of the value that is its own."""
     critics = Critics(1 + 2, SACConfig(hidden=(8,)), jax.random.key(0))
-    observation, values = jnp.array([[0.7]]), jnp.array([[0.2, -0.1]])
+    observation, values, log_probs = jnp.array([[0.7]]), jnp.array([[0.2, -0.1]]), jnp.array([[1.0, -3.0]])
     alone = [critics(observation, jnp.array([pooled])) for pooled in ([0.2, 0.0], [0.0, -0.1])]
     chance = 1 / (1 + np.exp(-0.1 / SOFTNESS))
-    np.testing.assert_allclose(
-        judge(critics, observation, values), chance * alone[0] + (1 - chance) * alone[1], rtol=1e-4
-    )
+    worth, log_prob = judge(critics, observation, values, log_probs)
+    np.testing.assert_allclose(worth, (chance * alone[0] + (1 - chance) * alone[1]).min(0), rtol=1e-4)
+    expected = chance * (np.log(chance) + 1.0) + (1 - chance) * (np.log(1 - chance) - 3.0)
+    np.testing.assert_allclose(log_prob, [expected], rtol=1e-4)
+
+
+def test_no_slot_is_drawn_for_the_entropy_of_its_value():
+    """A value whose slot has next to no chance feels nothing, however sure it is."""
+    critics = Critics(1 + 2, SACConfig(hidden=(8,)), jax.random.key(0))
+    values = jnp.array([[1.0, 0.0]])
+
+    def log_prob(log_probs):
+        return judge(critics, jnp.array([[0.7]]), values, log_probs)[1].sum()
+
+    np.testing.assert_allclose(jax.grad(log_prob)(jnp.zeros((1, 2))), [[1.0, 0.0]], atol=1e-4)
+    assert slot_sac(SACConfig(target_entropy=-1.0), 4).target_entropy == -0.25
 
 
 def test_it_learns_which_slot_and_how_much():
@@ -72,6 +86,6 @@ def test_it_learns_which_slot_and_how_much():
         return jax.tree.map(lambda leaf: leaf[jax.random.randint(key, (64,), 0, rows)], data)
 
     state = initial_state(1, 2, config, keys[3])
-    state, _ = update_many(state, batch_of, None, jax.random.split(keys[3], 1500), config, judge)
+    state, _ = update_many(state, batch_of, None, jax.random.split(keys[3], 1500), slot_sac(config, 2), judge)
     chosen = pool(state.averaged_actor(jnp.array([[1.0], [-1.0]])))
     np.testing.assert_allclose(chosen, [[0, -0.6], [0.5, 0]], atol=0.1)

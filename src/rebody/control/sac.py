@@ -96,15 +96,15 @@ class Actor(eqx.Module):
 
     def sample(
         self, observation: Float[AnyArray, "*batch observation"], key: PRNGKeyArray
-    ) -> tuple[Float[AnyArray, "*batch action"], Float[AnyArray, "*batch"]]:
-        """An action and its log-probability density [nats]."""
+    ) -> tuple[Float[AnyArray, "*batch action"], Float[AnyArray, "*batch action"]]:
+        """An action, and the log-probability density of each of its numbers [nats]."""
         mean, log_std = self._gaussian(observation)
         noise = jax.random.normal(key, mean.shape)
         raw = mean + jnp.exp(log_std) * noise
         gaussian = -0.5 * noise**2 - log_std - 0.5 * jnp.log(2 * jnp.pi)
         # ln(1 - tanh(u)^2), written so that it does not overflow
         squash = 2 * (jnp.log(2.0) - raw - jax.nn.softplus(-2 * raw))
-        return jnp.tanh(raw), jnp.sum(gaussian - squash, axis=-1)
+        return jnp.tanh(raw), gaussian - squash
 
     def _gaussian(self, observation):
         mean, log_std = jnp.split(self.net(observation), 2, axis=-1)
@@ -131,8 +131,27 @@ class Critics(eqx.Module):
         return jnp.stack([self.first(x)[..., 0], self.second(x)[..., 0]])
 
 
-Judge = Callable[[Critics, Float[AnyArray, "*batch observation"], Float[AnyArray, "*batch action"]], AnyArray]
-"""What an actor's action is worth to each critic, [2, *batch]; by itself that is what the critic says."""
+Judge = Callable[
+    [
+        Critics,
+        Float[AnyArray, "*batch observation"],
+        Float[AnyArray, "*batch action"],
+        Float[AnyArray, "*batch action"],
+    ],
+    tuple[Float[AnyArray, "*batch"], Float[AnyArray, "*batch"]],
+]
+"""(critics, observation, action, log-probability of each of its numbers) -> what is done in the end: its value to the
+more doubtful critic, and its log-probability."""
+
+
+def whole(
+    critics: Critics,
+    observation: Float[AnyArray, "*batch observation"],
+    action: Float[AnyArray, "*batch action"],
+    log_probs: Float[AnyArray, "*batch action"],
+) -> tuple[Float[AnyArray, "*batch"], Float[AnyArray, "*batch"]]:
+    """The judge of an actor whose action is done as it is."""
+    return critics(observation, action).min(0), log_probs.sum(-1)
 
 
 class SACState(eqx.Module):
@@ -168,11 +187,11 @@ def initial_state(observations: int, actions: int, config: SACConfig, key: PRNGK
 
 
 def update(
-    state: SACState, batch: SACBatch, key: PRNGKeyArray, config: SACConfig, judge: Judge = Critics.__call__
+    state: SACState, batch: SACBatch, key: PRNGKeyArray, config: SACConfig, judge: Judge = whole
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """One step of critics, actor and temperature, then of the two moving averages.
 
-    With a `judge` an actor may say more than what is done in the end, which is what `batch.action` holds.
+    With another `judge` an actor may say more than what is done in the end, which is what `batch.action` holds.
     """
     critic_key, actor_key = jax.random.split(key)
     state, critic_metrics = _update_critics(state, batch, critic_key, config, judge)
@@ -188,7 +207,7 @@ def update_many(
     inputs: Any,
     keys: Key[AnyArray, " update"],
     config: SACConfig,
-    judge: Judge = Critics.__call__,
+    judge: Judge = whole,
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """An update per key in one scan; `batch_of` makes its batch from one entry of `inputs` and a key.
 
@@ -215,8 +234,8 @@ def take_over(state: SACState, actor: Actor, name: str) -> SACState:
 
 def _update_critics(state, batch, key, config, judge):
     """Soft Bellman error against the smaller of the two target critics (thesis 2.14, 2.15)."""
-    next_action, next_log_prob = state.actor.sample(batch.next_observation, key)
-    next_value = judge(state.target_critics, batch.next_observation, next_action).min(0)
+    sampled = state.actor.sample(batch.next_observation, key)
+    next_value, next_log_prob = judge(state.target_critics, batch.next_observation, *sampled)
     next_value = next_value - jnp.exp(state.log_temperature) * next_log_prob
     target = batch.reward + config.discount * (1 - batch.terminal) * next_value
 
@@ -234,8 +253,7 @@ def _update_actor(state, batch, key, config, judge):
     """KL between the policy and the softmax of the critics (thesis 2.16, 2.17)."""
 
     def loss(actor):
-        action, log_prob = actor.sample(batch.observation, key)
-        value = judge(state.critics, batch.observation, action).min(0)
+        value, log_prob = judge(state.critics, batch.observation, *actor.sample(batch.observation, key))
         return jnp.mean(jnp.exp(state.log_temperature) * log_prob - value), -log_prob.mean()
 
     (value, entropy), gradient = eqx.filter_value_and_grad(loss, has_aux=True)(state.actor)

@@ -1,5 +1,7 @@
 """A high-level policy that was learned on a robot (thesis 5.6.2, 6.5): a value per slot, the largest is the subgoal."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -7,7 +9,7 @@ from jaxtyping import Float, PRNGKeyArray
 
 from rebody.bodies.robot import Reach
 from rebody.control.high_level import PolicyView
-from rebody.control.sac import Actor, Critics
+from rebody.control.sac import Actor, Critics, SACConfig
 from rebody.tasks import FAMILIES, GOAL
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal
 
@@ -45,18 +47,30 @@ def draw(values: Float[AnyArray, "*batch slot"], key: PRNGKeyArray) -> Float[Any
 
 
 def judge(
-    critics: Critics, observation: Float[AnyArray, "*batch observation"], values: Float[AnyArray, "*batch slot"]
-) -> Float[AnyArray, "2 *batch"]:
-    """What the critics, which see pooled values, expect of a slot that will be drawn.
+    critics: Critics,
+    observation: Float[AnyArray, "*batch observation"],
+    values: Float[AnyArray, "*batch slot"],
+    log_probs: Float[AnyArray, "*batch slot"],
+) -> tuple[Float[AnyArray, "*batch"], Float[AnyArray, "*batch"]]:
+    """What a slot that will be drawn is worth to the critics, which see pooled values, and its log-probability.
 
-    The mean over the slots with their chances: so the gradient reaches the value of each slot through its own pooled
-    vector, and the choice through the chances. Through the largest alone no choice could be learned.
+    Both are means over the slots with their chances: so the gradient reaches the value of each slot through its own
+    pooled vector, and the choice through the chances. Through the largest alone no choice could be learned. The
+    entropy is that of the drawn slot and its value (as in Delalleau et al. 2019): one that asked every value to be
+    uncertain would make those large that no slot is meant for, and so draw their slots.
     """
     slots = values.shape[-1]
     pooled = values[..., None, :] * jnp.eye(slots)
     seen = jnp.broadcast_to(observation[..., None, :], (*values.shape, observation.shape[-1]))
-    chance = jax.nn.softmax(jnp.abs(values) / SOFTNESS, axis=-1)
-    return jnp.sum(chance * critics(seen, pooled), axis=-1)
+    log_chance = jax.nn.log_softmax(jnp.abs(values) / SOFTNESS, axis=-1)
+    chance = jnp.exp(log_chance)
+    worth = jnp.sum(chance * critics(seen, pooled), axis=-1).min(0)
+    return worth, jnp.sum(chance * (log_chance + log_probs), axis=-1)
+
+
+def slot_sac(config: SACConfig, slots: int) -> SACConfig:
+    """For so many slots: the wanted entropy is per number of an action, and of all values one is done."""
+    return replace(config, target_entropy=config.target_entropy / slots)
 
 
 def subgoal_of(pooled: Float[AnyArray, "*batch slot"], state: GlobalState, slots: Slots) -> Subgoal:

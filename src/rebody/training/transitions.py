@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, PRNGKeyArray
 
 from rebody.control import sac
-from rebody.control.sac import Critics, Judge, SACBatch, SACConfig, SACState
+from rebody.control.sac import Judge, SACBatch, SACConfig, SACState, whole
 from rebody.types import AnyArray
 
 
@@ -23,7 +23,7 @@ def no_transitions(rows: int, features: int, actions: int) -> SACBatch:
 
 @eqx.filter_jit
 def learn(
-    policy: SACState, batches: SACBatch, key: PRNGKeyArray, config: SACConfig, judge: Judge = Critics.__call__
+    policy: SACState, batches: SACBatch, key: PRNGKeyArray, config: SACConfig, judge: Judge = whole
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """One update of soft actor-critic per batch; `batches` have the update first in every array."""
     keys = jax.random.split(key, len(batches.reward))

@@ -19,7 +19,7 @@ from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, RobotSpec, load_robot
 from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
-from rebody.control.slot_policy import SlotPolicy, Slots, draw, judge, slots_within, subgoal_of
+from rebody.control.slot_policy import SlotPolicy, Slots, draw, judge, slot_sac, slots_within, subgoal_of
 from rebody.training.arrival import arrival_bonus
 from rebody.training.high_level.config import HighLevelConfig
 from rebody.training.high_level.report import measure, save_high_level
@@ -91,7 +91,7 @@ def iterate(
     minds, metrics = collect(state, batch, frozen, config, rng, collect_key)
     written = (iteration + 1) * config.steps * config.robots
     transitions = draw_rows(state.replay, written, (config.updates, config.sac.batch_size), rng)
-    policy, learned = learn(state.sac, transitions, learn_key, config.sac, judge)
+    policy, learned = learn(state.sac, transitions, learn_key, slot_sac(config.sac, len(frozen.slots)), judge)
     state = eqx.tree_at(
         lambda s: (s.sac, s.minds, s.physics, s.iteration),
         state,
