@@ -1,12 +1,14 @@
 """Ways to act on a robot, side by side: one table, one page (thesis 6.5.3).
 
-    .venv/bin/python benchmarks/comparison.py [--robots cheetah ...] [--inference goal-velocity ...] [--seeds 3]
+    .venv/bin/python benchmarks/comparison.py [--robots cheetah ...] [--inference goal-velocity ...] [--seeds 1]
 
-Every agent on the same hidden tasks of each robot. What has no artifact is left out, what was judged before is not
-judged again. The page, `comparison.html` in `--out`, has intervals, pictures and every episode.
+Every agent on the same hidden tasks of each robot, and every module: those beyond the first differ in how the toy was
+randomised. What has no artifact is left out, what was judged before is not judged again. The page, `comparison.html`
+in `--out`, has intervals, pictures and every episode.
 """
 
 import argparse
+import sys
 from pathlib import Path
 
 from agents import cell
@@ -19,7 +21,9 @@ from rebody.store import load_artifact
 from rebody.tasks.task_file import read_tasks
 
 TASKS = Path(__file__).parent / "tasks"
-AGENTS = ("oracle", "bayes", "readout", "reuse", "retrain", "scratch", "flat", "idle")
+WITHOUT_MODULE = ("idle", "scratch", "bayes", "oracle")
+WITH_MODULE = ("reuse", "readout", "retrain", "flat")
+MODULES = ("goal-velocity", "goal-velocity-noise-0", "goal-velocity-noise-0.1", "goal-velocity-noise-0.2")
 COLUMNS = (
     "robot", "module", "agent", "goal: median error [m]", "velocity: median error [m/s]", "return",
     "base task right [%]", "fell [%]", "robot steps [million]", "training [min]",
@@ -29,15 +33,16 @@ COLUMNS = (
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robots", nargs="*", default=["cheetah", "walker", "hopper"])
-    parser.add_argument("--inference", nargs="*", default=["goal-velocity"])
-    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--inference", nargs="*", default=MODULES)
+    parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("runs/comparison"))
     arguments = parser.parse_args()
     print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}")
     for robot in arguments.robots:
-        for module in arguments.inference:
-            for agent in AGENTS:
-                compare(TrialOptions(robot=robot, inference=module, agent=agent), arguments.seeds, arguments.out)
+        ways = [(arguments.inference[0], agent) for agent in WITHOUT_MODULE]
+        ways += [(module, agent) for module in arguments.inference for agent in WITH_MODULE]
+        for module, agent in ways:
+            compare(TrialOptions(robot=robot, inference=module, agent=agent), arguments.seeds, arguments.out)
     page = arguments.out / "comparison.html"
     write_page([find(str(arguments.out))], page)
     print(f"\n{page}")
@@ -49,12 +54,12 @@ def compare(options: TrialOptions, seeds: int, out: Path) -> None:
         trial = options.load()
         results = judge(trial, out / f"{options.robot}-{trial.inference.name}-{options.agent}-{seeds}.json", seeds)
     except RebodyError as error:
-        print(f"{options.robot}, {options.agent}: left out, {error}")
+        print(f"{options.robot}, {options.inference}, {options.agent}: left out, {error}", file=sys.stderr)
         return
     families, steps_and_minutes = results.summary["families"], costs(trial)
     cells = [
         options.robot,
-        options.inference,
+        "" if options.agent in WITHOUT_MODULE else options.inference,
         options.agent,
         *(cell(families[family]["median_error"]) for family in ("goal", "velocity")),
         f"{sum(episode.return_ for episode in results.episodes) / len(results.episodes):.1f}",
