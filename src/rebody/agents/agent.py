@@ -110,7 +110,7 @@ class ReuseAgent(Agent):
         return Command(action, Subgoal(slot, achieved_by_way_of(slot, self.imagine(state, belief))))
 
     def imagine(self, state: GlobalState, belief: Belief) -> GlobalState:
-        """Where the nominal toy would be after each of `horizon` decisions, [horizon, *batch], the belief held fixed."""
+        """Where the nominal toy would be after each of `horizon` decisions, [decision, *batch], the belief held."""
         key = jax.random.key(0)  # a nominal toy has no noise
         understood = self.interpret(belief)
 
