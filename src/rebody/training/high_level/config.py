@@ -22,9 +22,9 @@ class HighLevelConfig:
     """Decisions kept."""
     decisions: int = 100
     """Length of an episode: 10 s."""
-    arrival: float = 0.05
-    """Added to the scaled reward r of a decision when r = 0, as on the toy: it pulls the last centimetres."""
-    arrival_width: float = 0.02
+    arrival: float = 0.3
+    """Added to the scaled reward r of a decision when r = 0: it pulls the last centimetres, and pays for a jump."""
+    arrival_width: float = 0.1
     """Half of it is added at r = -arrival_width."""
     fall: float = 5.0
     """Taken from the reward of a decision in which the robot fell."""
