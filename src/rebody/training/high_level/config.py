@@ -18,8 +18,8 @@ class HighLevelConfig:
     """Updates in an iteration."""
     iterations: int = 320
     """Length of the run."""
-    replay: int = 300_000
-    """Decisions kept."""
+    replay: int = 512_000
+    """Decisions kept: all of the run. Without its first ones, which tried everything, it gets worse again."""
     decisions: int = 100
     """Length of an episode: 10 s."""
     arrival: float = 0.3
