@@ -35,6 +35,7 @@ from rebody.evaluation.evaluate import Trial  # noqa: E402
 from rebody.inference.contract import Contract  # noqa: E402
 from rebody.inference.probe import Probe  # noqa: E402
 from rebody.store import tree_hash  # noqa: E402
+from rebody.tasks import BaseTask, TaskDistribution  # noqa: E402
 from rebody.training.flat import report as flat_report  # noqa: E402
 from rebody.training.high_level import report as high_level_report  # noqa: E402
 from rebody.training.inference import measure as inference_measure  # noqa: E402
@@ -71,7 +72,8 @@ def inference(stored_config):
         parts,
         (*(30 * w for w in weights), probe),  # fresh policies hardly act; these do
     )
-    return Inference("tiny", Contract.from_config(stored_config["contract"]), parts, MassDamper())
+    tasks = TaskDistribution((BaseTask("goal", -10.0, 10.0),))
+    return Inference("tiny", Contract.from_config(stored_config["contract"]), parts, MassDamper(), tasks)
 
 
 @pytest.fixture(scope="session")

@@ -29,7 +29,7 @@ from rebody.inference.mixture.padded import MixturePrior, no_mixture
 from rebody.inference.probe import Probe
 from rebody.nn import MLP
 from rebody.store import Artifact, arrays_into_tree, load_artifact
-from rebody.tasks import family_index
+from rebody.tasks import TaskDistribution, family_index
 from rebody.types import AnyArray, Tree
 
 
@@ -51,6 +51,8 @@ class Inference:
     contract: Contract
     parts: InferenceParts
     toy: Toy
+    tasks: TaskDistribution
+    """What it learned on."""
 
     @property
     def task_code(self) -> TaskCode:
@@ -210,7 +212,8 @@ def load_inference(reference: str) -> Inference:
     with _understood(artifact):
         contract = Contract.from_config(artifact.config["contract"])
         parts = _fill(inference_template, artifact)
-        return Inference(artifact.name, contract, parts, make_toy(**artifact.config["toy"]))
+        tasks = TaskDistribution.from_config(artifact.config["training"]["tasks"])
+        return Inference(artifact.name, contract, parts, make_toy(**artifact.config["toy"]), tasks)
 
 
 def load_tracker(reference: str) -> LoadedTracker:
