@@ -35,7 +35,7 @@ from rebody.evaluation.evaluate import Trial  # noqa: E402
 from rebody.inference.contract import Contract  # noqa: E402
 from rebody.inference.probe import Probe  # noqa: E402
 from rebody.store import tree_hash  # noqa: E402
-from rebody.tasks import TaskDistribution  # noqa: E402
+from rebody.tasks import BaseTask, TaskDistribution  # noqa: E402
 from rebody.training.flat import report as flat_report  # noqa: E402
 from rebody.training.high_level import report as high_level_report  # noqa: E402
 from rebody.training.inference import measure as inference_measure  # noqa: E402
@@ -59,7 +59,6 @@ def stored_config():
         "inference": {"units": 8, "window": WINDOW, "latent": 2},
         "high_level": {"fields": ["x", "vx"], "scales": [10.0, 3.5], "hidden": [8], "projections": 0},
         "toy": {"kind": "mass-damper", "mass": 1.0, "damping": 2.0, "max_force": 7.0},
-        "training": {"tasks": {"base_tasks": [{"family": "goal", "low": -10.0, "high": 10.0}]}},
     }
 
 
@@ -73,7 +72,7 @@ def inference(stored_config):
         parts,
         (*(30 * w for w in weights), probe),  # fresh policies hardly act; these do
     )
-    tasks = TaskDistribution.from_config(stored_config["training"]["tasks"])
+    tasks = TaskDistribution((BaseTask("goal", -10.0, 10.0),))
     return Inference("tiny", Contract.from_config(stored_config["contract"]), parts, MassDamper(), tasks)
 
 

@@ -38,7 +38,6 @@ def test_a_loaded_module_is_the_saved_one(inference, saved):
     )
     assert loaded.contract == inference.contract
     assert loaded.toy == MassDamper(max_force=5.0)
-    assert loaded.tasks == inference.tasks
 
 
 def test_a_module_comes_with_the_toy_that_it_learned_on(saved, stored_config, monkeypatch):
