@@ -35,7 +35,6 @@ from rebody.evaluation.evaluate import Trial  # noqa: E402
 from rebody.inference.contract import Contract  # noqa: E402
 from rebody.inference.probe import Probe  # noqa: E402
 from rebody.store import tree_hash  # noqa: E402
-from rebody.tasks import BaseTask, TaskDistribution  # noqa: E402
 from rebody.training.flat import report as flat_report  # noqa: E402
 from rebody.training.high_level import report as high_level_report  # noqa: E402
 from rebody.training.inference import measure as inference_measure  # noqa: E402
@@ -72,8 +71,7 @@ def inference(stored_config):
         parts,
         (*(30 * w for w in weights), probe),  # fresh policies hardly act; these do
     )
-    tasks = TaskDistribution((BaseTask("goal", -10.0, 10.0),))
-    return Inference("tiny", Contract.from_config(stored_config["contract"]), parts, MassDamper(), tasks)
+    return Inference("tiny", Contract.from_config(stored_config["contract"]), parts, MassDamper())
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ from rebody.control.high_level import PolicyView
 from rebody.errors import RebodyError
 from rebody.inference.contract import Contract
 from rebody.inference.probe import fit_probe
-from rebody.tasks import GOAL, STAND, VELOCITY, BaseTask, TaskDistribution
+from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.types import Belief, GlobalState, Task, Transition
 
 SIZE, DECISIONS = 3, 8
@@ -237,8 +237,7 @@ def standing(stored_config):
         replace_fn=lambda w: 30 * w,
     )
     parts = eqx.tree_at(lambda p: p.probe.families, parts, jnp.array([STAND]))
-    tasks = TaskDistribution((BaseTask("stand", -1.0, 1.0),))
-    return Inference("standing", Contract.from_config(config["contract"]), parts, FullToy(max_torque=6.0), tasks)
+    return Inference("standing", Contract.from_config(config["contract"]), parts, FullToy(max_torque=6.0))
 
 
 @pytest.mark.parametrize("kind", ["reuse", "readout", "bayes", "oracle", "idle"])

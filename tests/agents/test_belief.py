@@ -12,7 +12,7 @@ from rebody.agents.rollout import rollout_on_toy
 from rebody.bodies.toys import MassDamper
 from rebody.errors import RebodyError
 from rebody.inference.contract import Contract
-from rebody.tasks import GOAL, TaskDistribution
+from rebody.tasks import GOAL
 from rebody.types import Task
 
 DECISIONS = 9
@@ -25,7 +25,7 @@ def module_of(stored_config, *fields, **contract):
         "contract": stored_config["contract"] | {"fields": fields} | contract,
     }
     parts = eqx.filter_jit(lambda: inference_template(config))()
-    return Inference("untrained", Contract.from_config(config["contract"]), parts, MassDamper(), TaskDistribution(()))
+    return Inference("untrained", Contract.from_config(config["contract"]), parts, MassDamper())
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ from rebody.inference.mixture.padded import MixturePrior, no_mixture
 from rebody.inference.probe import Probe
 from rebody.nn import MLP
 from rebody.store import Artifact, arrays_into_tree, load_artifact
-from rebody.tasks import TaskDistribution, family_index
+from rebody.tasks import family_index
 from rebody.types import AnyArray, Tree
 
 
@@ -51,8 +51,6 @@ class Inference:
     contract: Contract
     parts: InferenceParts
     toy: Toy
-    tasks: TaskDistribution
-    """What it learned on."""
 
     @property
     def task_code(self) -> TaskCode:
@@ -212,8 +210,7 @@ def load_inference(reference: str) -> Inference:
     with _understood(artifact):
         contract = Contract.from_config(artifact.config["contract"])
         parts = _fill(inference_template, artifact)
-        tasks = TaskDistribution.from_config(artifact.config["training"]["tasks"])
-        return Inference(artifact.name, contract, parts, make_toy(**artifact.config["toy"]), tasks)
+        return Inference(artifact.name, contract, parts, make_toy(**artifact.config["toy"]))
 
 
 def load_tracker(reference: str) -> LoadedTracker:

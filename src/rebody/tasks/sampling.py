@@ -1,7 +1,6 @@
 """Drawing tasks: the base task uniformly (thesis 6.2), then its target uniformly (6.3)."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -25,11 +24,6 @@ class TaskDistribution:
     """Base tasks of equal probability."""
 
     base_tasks: tuple[BaseTask, ...]
-
-    @classmethod
-    def from_config(cls, config: dict[str, Any]) -> "TaskDistribution":
-        """From the settings that an artifact keeps."""
-        return cls(tuple(BaseTask(**base_task) for base_task in config["base_tasks"]))
 
     @property
     def families(self) -> tuple[int, ...]:

@@ -1,5 +1,7 @@
 """Robots with a frozen module each that listens: what policies learn from that act by its beliefs."""
 
+from collections.abc import Mapping
+
 import equinox as eqx
 import numpy as np
 from jaxtyping import Float, PRNGKeyArray
@@ -21,16 +23,20 @@ class Minds(eqx.Module):
     task: Task
 
 
-def within_reach(tasks: TaskDistribution, reach: Reach) -> TaskDistribution:
-    """The same base tasks, without speeds, pitches and jumps that the robot does not reach."""
-    ends = [(task.family, *reach.within(task.family, task.low, task.high)) for task in tasks.base_tasks]
-    return TaskDistribution(tuple(BaseTask(family, low, high) for family, low, high in ends if low < high))
+def tasks_within(module: Inference, reach: Reach) -> TaskDistribution:
+    """All that the module can infer, but no speed or pitch that the robot does not reach."""
+    return within_reach(module.contract.target_ranges, reach)
+
+
+def within_reach(target_ranges: Mapping[str, tuple[float, float]], reach: Reach) -> TaskDistribution:
+    """Tasks of families with these ranges, as far as the robot reaches."""
+    return TaskDistribution(tuple(BaseTask(name, *reach.within(name, *ends)) for name, ends in target_ranges.items()))
 
 
 def new_minds(batch: RobotBatch, module: Inference, key: PRNGKeyArray) -> Minds:
     """Fresh hidden tasks, and nothing known about them."""
     encoder, shape = module.parts.module.encoder, (batch.size,)
-    task = within_reach(module.tasks, batch.spec.reach).sample(key, shape)
+    task = tasks_within(module, batch.spec.reach).sample(key, shape)
     return Minds(encoder.initial(shape), encoder.prior(shape), batch.spec.observe(batch.qpos, batch.qpos), task)
 
 

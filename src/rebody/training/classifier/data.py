@@ -16,7 +16,7 @@ from rebody.agents.rollout import Episodes, rollout_on_toy
 from rebody.agents.slots import OneSlot
 from rebody.bodies.toys import Disturbance, Randomisation, no_disturbance
 from rebody.inference.mixture.padded import MixturePrior
-from rebody.tasks import TaskDistribution, achieved_by_way_of
+from rebody.tasks import BaseTask, TaskDistribution, achieved_by_way_of
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
 DECISIONS = 200
@@ -36,9 +36,8 @@ class ToyWorld:
     @classmethod
     def of(cls, training: dict[str, Any]) -> "ToyWorld":
         """From the artifact's training settings."""
-        return cls(
-            TaskDistribution.from_config(training["tasks"]), Randomisation(**with_tuples(training["randomisation"]))
-        )
+        base_tasks = tuple(BaseTask(**base_task) for base_task in training["tasks"]["base_tasks"])
+        return cls(TaskDistribution(base_tasks), Randomisation(**with_tuples(training["randomisation"])))
 
     def draw(self, key: PRNGKeyArray, episodes: int, switch_share: float, *, disturbed: bool):
         """Active tasks [time, episode], and how each episode's toy departs from the nominal one."""

@@ -13,7 +13,7 @@ from rebody.tasks import FAMILIES
 from rebody.training.card import card
 from rebody.training.held_out import act, figures_of, rows_of
 from rebody.training.high_level.config import HighLevelConfig
-from rebody.training.minds import within_reach
+from rebody.training.minds import tasks_within
 from rebody.training.run import Run
 
 TASKS = 100
@@ -23,7 +23,7 @@ DECISIONS = 200
 
 def measure(policy: SlotPolicy, module: Inference, controller: TrackerController, spec: RobotSpec) -> dict[str, float]:
     """Final error on held-out tasks of each family, return, share that fell."""
-    agent, tasks = build_agent("retrain", module, high_level=policy), within_reach(module.tasks, spec.reach)
+    agent, tasks = build_agent("retrain", module, high_level=policy), tasks_within(module, spec.reach)
     return figures_of(*act(agent, controller, spec, tasks, module.contract.reward, (DECISIONS, TASKS)))
 
 

@@ -78,7 +78,7 @@ def act(
     tasks = config.tasks.sample_episodes(task_key, held_out, DECISIONS, switch_share)
     tasks = jax.tree.map(lambda leaf: leaf.T, tasks)
     rough = config.randomisation.sample(disturbance_key, (held_out,))
-    inference = Inference("in training", contract_of(config), parts, toy, config.tasks)
+    inference = Inference("in training", contract_of(config), parts, toy)
     agent = build_agent(kind, inference, tasks, horizon=1)
     episodes = rollout_on_toy(agent, toy, tasks, config.reward, rough if disturbed else no_disturbance((held_out,)))
     return Outcome(*jax.tree.map(np.asarray, (tasks, episodes)))

@@ -43,7 +43,7 @@ class ScratchConfig:
         base = goal_velocity()
         return replace(
             base,
-            tasks=within_reach(base.tasks, reach),
+            tasks=within_reach(base.target_ranges, reach),
             inference=self.inference,
             prior="gaussian",
             switch_share=self.switch_share,
