@@ -24,7 +24,10 @@ class Minds(eqx.Module):
 
 
 def tasks_within(module: Inference, reach: Reach) -> TaskDistribution:
-    """All that the module can infer, but no speed or pitch that the robot does not reach."""
+    """All between a module's smallest and largest targets, but no speed or pitch that the robot does not reach.
+
+    That is more than the module learned on: relative to a small target centimetres count, so they make a policy precise.
+    """
     return within_reach(module.contract.target_ranges, reach)
 
 
