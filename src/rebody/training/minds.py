@@ -26,7 +26,7 @@ class Minds(eqx.Module):
 def tasks_within(module: Inference, reach: Reach) -> TaskDistribution:
     """All between a module's smallest and largest targets, but no speed or pitch that the robot does not reach.
 
-    That is more than the module learned on: relative to a small target centimetres count, so they make a policy precise.
+    That is more than the module learned on: relative to a small target centimetres count, and a policy gets precise.
     """
     return within_reach(module.contract.target_ranges, reach)
 
