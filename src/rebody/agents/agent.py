@@ -111,14 +111,8 @@ class ReuseAgent(Agent):
 
     def imagine(self, state: GlobalState, belief: Belief) -> GlobalState:
         """Where the nominal toy would be after each of `horizon` decisions, [decision, *batch], the belief held."""
-        key = jax.random.key(0)  # a nominal toy has no noise
         understood = self.interpret(belief)
-
-        def step(body, _):
-            body = self.toy.step(body, self.high_level(self.toy.observe(body), understood), key)
-            return body, self.toy.observe(body)
-
-        return jax.lax.scan(step, self.toy.from_global(state), None, length=self.horizon)[1]
+        return self.toy.imagine(state, lambda seen: self.high_level(seen, understood), self.horizon)
 
 
 class ToldAgent(Agent):

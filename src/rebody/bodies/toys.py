@@ -142,6 +142,18 @@ class Toy(eqx.Module):
         """The nominal toy in the place of any body: where imagination starts (thesis 5.6.2)."""
         return self.initial(state.x, state.vx)
 
+    def imagine(
+        self, state: GlobalState, act: Callable[[GlobalState], Float[AnyArray, "*batch action"]], decisions: int
+    ) -> GlobalState:
+        """Where the nominal toy would be after each of so many decisions from there, [decision, *batch]."""
+        key = jax.random.key(0)  # a nominal toy has no noise
+
+        def step(body, _):
+            body = self.step(body, act(self.observe(body)), key)
+            return body, self.observe(body)
+
+        return jax.lax.scan(step, self.from_global(state), None, length=decisions)[1]
+
 
 class MassDamper(Toy):
     """m x'' = F - c x' (thesis 5.13, 6.5-6.6), semi-implicit Euler.

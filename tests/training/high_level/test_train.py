@@ -82,7 +82,7 @@ def test_a_fall_costs_and_arrival_pays(config):
     earned = np.array([0.0, -config.arrival_width, -1.0], np.float32)
     stood, fell = (shaped(earned, np.full(3, fallen), config) for fallen in (False, True))
     np.testing.assert_allclose(stood[:2], [config.arrival, config.arrival / 2 - config.arrival_width], rtol=1e-5)
-    assert stood[2] == pytest.approx(-1.0, abs=config.arrival / 10)
+    assert stood[2] == pytest.approx(-1.0 + config.arrival * config.arrival_width / (config.arrival_width + 1.0))
     np.testing.assert_allclose(stood - fell, config.fall, rtol=1e-5)
 
 

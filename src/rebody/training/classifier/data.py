@@ -68,12 +68,7 @@ class TrackingToy(ReuseAgent):
 
         def outcome(action: Float[AnyArray, " action"]) -> Float[AnyArray, "*batch"]:
             held = jnp.broadcast_to(action, (*state.x.shape, actions))
-
-            def step(body, _):
-                body = self.toy.step(body, held, jax.random.key(0))
-                return body, self.toy.observe(body)
-
-            _, states = jax.lax.scan(step, self.toy.from_global(state), None, length=HOLD)
+            states = self.toy.imagine(state, lambda _: held, HOLD)
             return jnp.abs(achieved_by_way_of(subgoal.slot, states) - subgoal.value)
 
         nearest = jnp.argmin(jax.vmap(outcome)(candidates), axis=0)
