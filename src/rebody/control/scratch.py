@@ -4,8 +4,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from rebody.control.high_level import Places, seen_from
+from rebody.control.high_level import Places, TaskCode, seen_from
 from rebody.control.sac import Actor
+from rebody.tasks.families import FAMILIES
 from rebody.types import AnyArray, Belief
 
 
@@ -36,3 +37,9 @@ def scratch_observation(
 def observed(joints: int, places: Places) -> int:
     """How many numbers it sees, with so many of the joints."""
     return joints + 4 * len(places)
+
+
+def told_code(places: Places) -> TaskCode:
+    """How a task is put to the policy that is told it: as a belief without doubt that speaks of these places."""
+    family_of = {family.field: index for index, family in enumerate(FAMILIES)}
+    return TaskCode(tuple((family_of[field], unit) for field, unit in places))

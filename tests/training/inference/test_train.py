@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from rebody.agents.parts import task_code
 from rebody.inference.mixture.padded import no_clusters
 from rebody.inference.prior import unit_gaussian
 from rebody.store import tree_hash
@@ -115,7 +116,7 @@ def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, con
 
 def test_the_oracle_is_told_the_task_that_is_on_at_every_decision(labelled, config):
     """In this replay, another one at every decision; the last one lasts."""
-    told = tell(labelled, config)
+    told = tell(labelled, task_code(config.target_ranges))
     target = np.asarray(labelled.task.target) / 10.0
     assert told.belief.mean.shape == (*labelled.state.x.shape, 2)
     np.testing.assert_array_equal(told.belief.mean[..., 0], np.ones(labelled.state.x.shape))

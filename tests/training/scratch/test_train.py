@@ -1,5 +1,7 @@
 """What a robot learns everything from: its own episodes, with the beliefs of the module that learns beside it."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,12 +9,14 @@ import pytest
 
 from rebody.bodies import RobotBatch
 from rebody.control.sac import SACConfig
-from rebody.control.scratch import scratch_observation
+from rebody.control.scratch import scratch_observation, told_code
 from rebody.inference import InferenceConfig
 from rebody.tasks import GOAL, reward
+from rebody.training.inference.train import tell
+from rebody.training.minds import Minds
 from rebody.training.scratch import ScratchConfig
-from rebody.training.scratch.train import collect, initial_state, sample_steps
-from rebody.types import Task, Transition
+from rebody.training.scratch.train import collect, initial_state, sample_steps, understand
+from rebody.types import GlobalState, Task, Transition
 
 ROBOTS, DECISIONS, GROUPS, START = 3, 5, 2, 15.0
 PER_DECISION, JOINTS = 2, 17
@@ -89,22 +93,50 @@ def test_a_goal_is_paid_by_its_distance(config, meta, state, cheetah):
     np.testing.assert_allclose(group.steps.reward[:, is_goal], expected, atol=1e-4)
 
 
-def test_a_control_step_is_learned_from_with_the_belief_of_its_decision(config, state, group):
-    """Whose sample is which shows by x, which no two control steps share."""
-    replay = jax.tree.map(lambda leaf: np.stack([leaf, leaf]), group)
-    understood = state.module.decoder.interpret(jax.tree.map(jnp.asarray, replay.episodes.belief))
-    batch = sample_steps(jax.tree.map(jnp.asarray, replay), understood, 2, config, jax.random.key(1))
-    steps = group.steps
-    for row in range(20):
-        step, robot = np.argwhere((steps.joints == batch.observation[row, :JOINTS]).all(axis=-1))[0]
-        held = [jax.tree.map(lambda leaf: leaf[0, robot, at // PER_DECISION], understood) for at in (step, step + 1)]  # noqa: B023
-        now = scratch_observation(PLACES, steps.joints[step, robot], jnp.asarray(steps.x[step, robot]), held[0])
-        later = scratch_observation(
-            PLACES, steps.next_joints[step, robot], jnp.asarray(steps.next_x[step, robot]), held[1]
+def seen_at(steps, step, robot, known):
+    """What the policy sees before and after a control step of the first group, by what is known at its decisions."""
+    ends = (steps.joints, steps.x, step), (steps.next_joints, steps.next_x, step + 1)
+    return [
+        scratch_observation(
+            PLACES,
+            joints[step, robot],
+            jnp.asarray(x[step, robot]),
+            jax.tree.map(lambda leaf: leaf[0, robot, at // PER_DECISION], known),  # noqa: B023 (used at once)
         )
-        np.testing.assert_allclose(batch.observation[row], now, atol=1e-6)
-        np.testing.assert_allclose(batch.next_observation[row], later, atol=1e-6)
+        for joints, x, at in ends
+    ]
+
+
+def test_a_control_step_is_learned_from_with_the_belief_of_its_decision_or_the_truth(config, state, group):
+    """Whose sample is which shows by x, which no two control steps share."""
+    replay = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), group)
+    believed = state.module.decoder.interpret(replay.episodes.belief)
+    told = tell(replay.episodes, told_code(PLACES)).belief
+    batch = sample_steps(replay, believed, told, 2, config, jax.random.key(1))
+    steps, times_told = group.steps, 0
+    for row in range(100):
+        step, robot = np.argwhere((steps.joints == batch.observation[row, :JOINTS]).all(axis=-1))[0]
+        seen = [batch.observation[row], batch.next_observation[row]]
+        is_told = np.allclose(seen[0], seen_at(steps, step, robot, told)[0], atol=1e-6)
+        np.testing.assert_allclose(seen, seen_at(steps, step, robot, told if is_told else believed), atol=1e-6)
         assert batch.reward[row] == pytest.approx(float(steps.reward[step, robot]), abs=1e-6)
+        times_told += is_told
+    assert 30 < times_told < 70  # of 100, half
+
+
+def test_who_is_told_goes_by_the_truth_in_the_terms_of_a_belief(config, state):
+    """A goal at -5 m: meant is x, half of its scale to the back, no doubt."""
+    four = replace(config, robots=4)
+    task = Task(np.full(4, GOAL, np.int32), np.full(4, -5.0, np.float32))
+    encoder = state.module.encoder
+    here = GlobalState(*[np.zeros(4, np.float32)] * 8)
+    minds = Minds(encoder.initial((4,)), encoder.prior((4,)), here, task)
+    gone_by = understand(state.module, minds, four)
+    np.testing.assert_allclose(gone_by.mean[:2], [[1.0, 0.0, -0.5, 0.0]] * 2)
+    assert not np.asarray(gone_by.variance[:2]).any()
+    believed = state.module.decoder.interpret(minds.belief)
+    np.testing.assert_allclose(gone_by.mean[2:], believed.mean[2:])
+    np.testing.assert_allclose(gone_by.variance[2:], believed.variance[2:])
 
 
 def test_the_policy_sees_goals_from_where_it_is_and_speeds_as_they_are(state):

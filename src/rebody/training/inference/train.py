@@ -17,7 +17,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from rebody.agents.parts import InferenceParts, load_inference, task_code
 from rebody.bodies.toys import Toy, make_toy
 from rebody.control import sac
-from rebody.control.high_level import HighLevelPolicy, PolicyView
+from rebody.control.high_level import HighLevelPolicy, PolicyView, TaskCode
 from rebody.control.sac import SACBatch, SACState
 from rebody.errors import RebodyError
 from rebody.inference.mixture.padded import Clusters, clusters_of, no_clusters
@@ -97,7 +97,7 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
         if iteration < config.inference_iterations:
             replay = refresh_beliefs(module.encoder, replay, config.episodes // 2)
             # it acts in no episode itself: later ones, of a policy that hardly explores, would lead it astray
-            told_replay = tell(replay, config)
+            told_replay = tell(replay, task_code(config.target_ranges))
             told, told_metrics = update_policy(told, told_replay, stored, config, config.told_view, keys[2])
             metrics |= {f"told/{name}": value for name, value in told_metrics.items()}
         interpreted = eqx.tree_at(lambda e: e.belief, replay, module.decoder.interpret(replay.belief))
@@ -212,10 +212,10 @@ def update_policy(
     return sac.update_many(policy, batch_of, None, jax.random.split(key, config.policy_updates), config.sac)
 
 
-def tell(episodes: Episodes, config: MetaConfig) -> Episodes:
+def tell(episodes: Episodes, code: TaskCode) -> Episodes:
     """The same episodes with the truth in place of what was believed; the last task lasts beyond the end."""
     active = jax.tree.map(lambda leaf: jnp.concatenate([leaf, leaf[..., -1:]], axis=-1), episodes.task)
-    return eqx.tree_at(lambda e: e.belief, episodes, task_code(config.target_ranges)(active))
+    return eqx.tree_at(lambda e: e.belief, episodes, code(active))
 
 
 def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray) -> Evidence:

@@ -19,23 +19,26 @@ class ScratchConfig:
     """Copies that move in parallel."""
     decisions: int = 100
     """Length of an episode: 10 s."""
-    groups: int = 60
+    groups: int = 40
     """Iterations whose episodes are kept for learning."""
     iterations: int = 256
     """Length of the run; an iteration is an episode of every robot."""
     inference_updates: int = 128
     """Updates of encoder and decoder in an iteration."""
-    policy_updates: int = 1024
+    policy_updates: int = 768
     """Updates of the policy in an iteration."""
     start: float = 15.0
     """Episodes begin anywhere within this from x = 0 [m], so that the latent cannot take the start for the task."""
     switch_share: float = 0.5
     """Share of episodes in which the task changes once, as on the toy."""
+    told_share: float = 0.5
+    """Share of robots that are told their task, and of control steps that the policy learns from as if it were. While
+    nothing is known, a policy that only believes learns to stand still, and from that the module learns nothing."""
     inference: InferenceConfig = field(default_factory=lambda: goal_velocity().inference)
     """Encoder, decoder and their loss: those of the toy's module."""
     reward: TrackerReward = field(default_factory=TrackerReward)
     """What the policy is paid: as a tracker that is told the hidden task."""
-    sac: SACConfig = field(default_factory=lambda: SACConfig(projections=8, decay_updates=260_000))
+    sac: SACConfig = field(default_factory=lambda: SACConfig(projections=8, decay_updates=195_000))
     """Hyperparameters of soft actor-critic."""
 
     def meta(self, reach: Reach) -> MetaConfig:

@@ -2,6 +2,7 @@
 
 The encoder and decoder of the toy's module learn from the robot's own episodes, the policy off-policy beside them on
 beliefs that today's encoder holds along stored episodes, as PEARL does (Rakelly et al. 2019). Nothing is reused.
+As on the toy, some are told their task, so that there is something to learn from before anything is believed.
 """
 
 from dataclasses import asdict, replace
@@ -19,13 +20,13 @@ from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
 from rebody.control.high_level import Places
 from rebody.control.sac import Actor, SACBatch, SACState
-from rebody.control.scratch import ScratchPolicy, observed, scratch_observation
+from rebody.control.scratch import ScratchPolicy, observed, scratch_observation, told_code
 from rebody.inference.module import InferenceModule
 from rebody.inference.prior import SplitPrior, unit_gaussian
 from rebody.inference.probe import Probe
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, refresh_beliefs
-from rebody.training.inference.train import optimiser_of, store, take_over, update_inference
+from rebody.training.inference.train import optimiser_of, store, take_over, tell, update_inference
 from rebody.training.minds import Minds, listen, put_on_feet
 from rebody.training.motion import told_reward
 from rebody.training.run import Metrics, Run
@@ -34,6 +35,10 @@ from rebody.training.scratch.report import measure, save_scratch
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
 EVALUATE_EVERY = 16
+REFRESH_EVERY = 4
+"""Iterations after which today's encoder goes along all stored episodes again."""
+DECIDES_EVERY = 4
+"""Of so many robots one takes the most likely action, as it will when it is used."""
 
 
 class ControlSteps(eqx.Module):
@@ -92,7 +97,8 @@ def iterate(
     module, optimiser, metrics = update_inference(
         state.module, state.optimiser, replay.episodes, stored, prior, meta, keys[1]
     )
-    replay = replace(replay, episodes=refresh_beliefs(module.encoder, replay.episodes, config.robots))
+    if (iteration + 1) % REFRESH_EVERY == 0:
+        replay = replace(replay, episodes=refresh_beliefs(module.encoder, replay.episodes, config.robots))
     policy, learned = update_policy(state.sac, module, replay, stored, config, keys[2])
     state = RunState(module, optimiser, policy, replay, state.iteration + 1)
     metrics |= learned | {"task_reward": fresh.episodes.reward.mean()}
@@ -111,7 +117,7 @@ def collect(
     rng: np.random.Generator,
     key: PRNGKeyArray,
 ) -> Replay:
-    """One group: every robot acts on a hidden task by what it believes."""
+    """One group: every robot acts on a hidden task by what it believes, or by what it is told."""
     task_key, action_key = jax.random.split(key)
     tasks = meta.tasks.sample_episodes(task_key, config.robots, config.decisions, config.switch_share)
     tasks = jax.tree.map(np.asarray, tasks)
@@ -145,7 +151,7 @@ def hold(
     key: PRNGKeyArray,
 ) -> list[ControlSteps]:
     """The control steps of a decision, all by the same belief."""
-    understood, steps, places = _understand(module, minds.belief), [], config.inference.places
+    understood, steps, places = understand(module, minds, config), [], config.inference.places
     for step in range(batch.spec.steps_per_decision):
         joints, x, before = batch.joint_state(), batch.x.astype(np.float32), batch.qpos.copy()
         action = _explore(actor, places, joints, x, understood, jax.random.fold_in(key, step))
@@ -173,27 +179,32 @@ def update_policy(
     key: PRNGKeyArray,
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """Steps of soft actor-critic on stored control steps, with today's beliefs."""
-    understood = module.decoder.interpret(replay.episodes.belief)
+    believed = module.decoder.interpret(replay.episodes.belief)
+    told = tell(replay.episodes, told_code(config.inference.places)).belief
 
     def batch_of(_: None, key: PRNGKeyArray) -> SACBatch:
-        return sample_steps(replay, understood, stored, config, key)
+        return sample_steps(replay, believed, told, stored, config, key)
 
     return sac.update_many(policy, batch_of, None, jax.random.split(key, config.policy_updates), config.sac)
 
 
-def sample_steps(replay: Replay, understood: Belief, stored, config: ScratchConfig, key: PRNGKeyArray) -> SACBatch:
-    """Control steps drawn evenly from the groups, with the beliefs held before and after."""
+def sample_steps(
+    replay: Replay, believed: Belief, told: Belief, stored, config: ScratchConfig, key: PRNGKeyArray
+) -> SACBatch:
+    """Control steps drawn evenly from the groups, each with the beliefs held before and after, or with the truth."""
     episodes, steps, size = replay.episodes, replay.steps, (config.sac.batch_size,)
     _, length, robots = steps.reward.shape
-    keys = jax.random.split(key, 3)
+    keys = jax.random.split(key, 4)
     group = jax.random.randint(keys[0], size, 0, stored)
     step = jax.random.randint(keys[1], size, 0, length)
     robot = jax.random.randint(keys[2], size, 0, robots)
+    is_told = jax.random.bernoulli(keys[3], config.told_share, size)
     chosen = jax.tree.map(lambda leaf: leaf[group, step, robot], steps)
     per_decision = length // episodes.reward.shape[-1]
 
     def observation(joints, x, step):
-        held = jax.tree.map(lambda leaf: leaf[group, robot, step // per_decision], understood)
+        at = group, robot, step // per_decision
+        held = jax.tree.map(lambda yes, no: jnp.where(is_told[:, None], yes[at], no[at]), told, believed)
         return scratch_observation(config.inference.places, joints, x, held)
 
     return SACBatch(
@@ -255,10 +266,15 @@ def trained_parts(state: RunState, meta: MetaConfig) -> ScratchParts:
 
 
 @eqx.filter_jit
-def _understand(module: InferenceModule, belief: Belief) -> Belief:
-    return module.decoder.interpret(belief)
+def understand(module: InferenceModule, minds: Minds, config: ScratchConfig) -> Belief:
+    """What each robot goes by: the first ones are told."""
+    robots = jnp.arange(config.robots)[:, None]
+    told, believed = told_code(config.inference.places)(minds.task), module.decoder.interpret(minds.belief)
+    return jax.tree.map(lambda yes, no: jnp.where(robots < config.told_share * config.robots, yes, no), told, believed)
 
 
 @eqx.filter_jit
 def _explore(actor: Actor, places: Places, joints, x, understood: Belief, key: PRNGKeyArray):
-    return actor.sample(scratch_observation(places, joints, x, understood), key)[0]
+    observation = scratch_observation(places, joints, x, understood)
+    decides = jnp.arange(len(x))[:, None] % DECIDES_EVERY == 0
+    return jnp.where(decides, actor(observation), actor.sample(observation, key)[0])
