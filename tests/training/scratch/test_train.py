@@ -81,16 +81,19 @@ def test_the_module_hears_the_tasks_own_reward_and_the_beliefs_are_its_own(group
     np.testing.assert_array_equal(episodes.belief.mean[:, 0], 0.0)
 
 
-def test_a_goal_is_paid_by_its_distance(config, meta, state, cheetah):
-    still = ScratchConfig(**{**vars(config), "switch_share": 0.0})
+def test_going_to_a_goal_is_paid_by_how_well_its_speed_is_held(config, meta, state, cheetah):
+    """Wanted is 1.5 times what is left a second, at most 3 m/s."""
+    still = replace(config, switch_share=0.0)
     batch = RobotBatch(cheetah, ROBOTS)
     group = collect(state.module, state.sac.actor, batch, still, meta, np.random.default_rng(0), jax.random.key(3))
-    is_goal = group.episodes.task.family[:, 0] == GOAL
+    steps, is_goal = group.steps, group.episodes.task.family[:, 0] == GOAL
     assert is_goal.any()
-    miss = np.abs(group.episodes.task.target[:, 0] - group.steps.next_x)[:, is_goal]
-    posture = 0.5 * (1 - np.cos(group.steps.next_joints[..., 1])) + 0.02 * np.mean(group.steps.action**2, axis=-1)
-    expected = 0.05 / (0.1 + miss) - 0.2 * miss - posture[:, is_goal]
-    np.testing.assert_allclose(group.steps.reward[:, is_goal], expected, atol=1e-4)
+    left = (group.episodes.task.target[:, 0] - steps.next_x)[:, is_goal]
+    wanted, speed = np.clip(1.5 * left, -3.0, 3.0), (steps.next_x - steps.x)[:, is_goal] / 0.05
+    held = np.maximum(1 - np.abs(wanted - speed) / np.maximum(np.abs(wanted), 0.5), -0.5)
+    posture = 0.5 * (1 - np.cos(steps.next_joints[..., 1])) + 0.02 * np.mean(steps.action**2, axis=-1)
+    expected = 0.5 * held + 0.02 / (0.1 + np.abs(left)) - posture[:, is_goal]
+    np.testing.assert_allclose(steps.reward[:, is_goal], expected, atol=1e-3)
 
 
 def seen_at(steps, step, robot, known):

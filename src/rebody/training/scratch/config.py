@@ -15,17 +15,17 @@ from rebody.training.minds import within_reach
 class ScratchConfig:
     """One training run; the defaults spend the cheetah's control steps of a tracker and a high-level policy."""
 
-    robots: int = 64
+    robots: int = 32
     """Copies that move in parallel."""
     decisions: int = 100
     """Length of an episode: 10 s."""
-    groups: int = 40
+    groups: int = 80
     """Iterations whose episodes are kept for learning."""
-    iterations: int = 256
+    iterations: int = 512
     """Length of the run; an iteration is an episode of every robot."""
-    inference_updates: int = 128
+    inference_updates: int = 64
     """Updates of encoder and decoder in an iteration."""
-    policy_updates: int = 768
+    policy_updates: int = 384
     """Updates of the policy in an iteration."""
     start: float = 15.0
     """Episodes begin anywhere within this from x = 0 [m], so that the latent cannot take the start for the task."""
@@ -36,8 +36,9 @@ class ScratchConfig:
     nothing is known, a policy that only believes learns to stand still, and from that the module learns nothing."""
     inference: InferenceConfig = field(default_factory=lambda: goal_velocity().inference)
     """Encoder, decoder and their loss: those of the toy's module."""
-    reward: TrackerReward = field(default_factory=TrackerReward)
-    """What the policy is paid: as a tracker that is told the hidden task."""
+    reward: TrackerReward = field(default_factory=lambda: TrackerReward(relative=0.5, arrival=0.2))
+    """What the policy is paid: as a tracker that is told the hidden task. By relative errors: what a far goal costs by
+    its distance drowns all that a step is worth, as long as a goal is not told from another one."""
     sac: SACConfig = field(default_factory=lambda: SACConfig(projections=8, decay_updates=195_000))
     """Hyperparameters of soft actor-critic."""
 

@@ -34,8 +34,8 @@ from rebody.training.scratch.config import ScratchConfig
 from rebody.training.scratch.report import measure, save_scratch
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
-EVALUATE_EVERY = 16
-REFRESH_EVERY = 4
+EVALUATE_EVERY = 32
+REFRESH_EVERY = 8
 """Iterations after which today's encoder goes along all stored episodes again."""
 DECIDES_EVERY = 4
 """Of so many robots one takes the most likely action, as it will when it is used."""
