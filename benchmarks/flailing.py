@@ -18,7 +18,7 @@ from rebody.agents.controller import Controller
 from rebody.agents.parts import load_inference
 from rebody.agents.rollout import rollout_on_robot
 from rebody.bodies import load_robot
-from rebody.control.flat import flat_observation
+from rebody.control.flat import FlatView
 from rebody.control.sac import Actor
 from rebody.tasks.task_file import active_tasks, read_tasks
 from rebody.training.flat import FlatConfig
@@ -39,7 +39,7 @@ class Flailing(Controller):
         return batch.joint_state()
 
     def __call__(self, joints, x, pitch, subgoal, belief):
-        observation = flat_observation(joints, x, belief, 10.0)
+        observation = FlatView(reach=10.0)(joints, x, belief)
         # a fresh draw at every control step, from what the robot feels
         key = jax.random.fold_in(self.key, (1e4 * joints[0, -1]).astype(np.int32))
         return self.actor.sample(observation, key)[0]

@@ -27,7 +27,7 @@ from rebody.bodies import load_robot  # noqa: E402
 from rebody.bodies.robot import Reach  # noqa: E402
 from rebody.bodies.toys import MassDamper  # noqa: E402
 from rebody.cli.main import run  # noqa: E402
-from rebody.control.flat import FlatPolicy  # noqa: E402
+from rebody.control.flat import FlatPolicy, FlatView  # noqa: E402
 from rebody.control.sac import Actor, SACConfig  # noqa: E402
 from rebody.control.step_predictor import StepPredictor  # noqa: E402
 from rebody.control.tracker import Tracker  # noqa: E402
@@ -91,7 +91,7 @@ def tracker():
 
 @pytest.fixture(scope="session")
 def flat_policy():
-    return FlatPolicy(lively_actor(JOINTS + 1 + 4, 2), 10.0)
+    return FlatPolicy(lively_actor(JOINTS + 1 + 4, 2), FlatView(reach=10.0))
 
 
 @pytest.fixture(scope="session")

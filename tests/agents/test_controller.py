@@ -26,8 +26,8 @@ def following(tracker):
 
 
 @pytest.fixture(scope="module")
-def believing(flat_policy):
-    return FlatController(flat_policy)
+def believing(flat_policy, inference):
+    return FlatController(flat_policy, inference.parts.module.decoder)
 
 
 def test_a_tracker_sees_the_pace_and_a_flat_policy_does_not(cheetah, following, believing):

@@ -214,7 +214,7 @@ def test_a_tick_per_decision_is_the_default_bit_for_bit(agent, tracker, cheetah,
 
 def test_a_flat_policy_moves_by_the_belief_alone(inference, flat_policy, cheetah):
     agent, tasks = build_agent("flat", inference), lasting(*TARGETS)
-    controller = FlatController(flat_policy)
+    controller = FlatController(flat_policy, inference.parts.module.decoder)
     episodes = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS)
     assert np.isnan(episodes.subgoal.value).all()
     assert np.isfinite(episodes.state.x).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rebody.agents.parts import task_code
-from rebody.control.flat import flat_observation
+from rebody.control.flat import FlatView
 from rebody.control.high_level import PolicyView, TaskCode
 from rebody.tasks import GOAL, VELOCITY
 from rebody.types import Belief, GlobalState, Task
@@ -64,5 +64,5 @@ def test_far_from_home_and_near_it_are_the_same_and_farther_than_far_too():
 def test_a_flat_policy_sees_joints_then_x_then_the_belief():
     joints = np.array([0.1, -0.2], np.float32)
     np.testing.assert_allclose(
-        flat_observation(joints, np.asarray(-5.0, np.float32), BELIEF, 10.0), [0.1, -0.2, -0.5, 0.5, -1.0, 0.5, 2.0]
+        FlatView(reach=10.0)(joints, np.asarray(-5.0, np.float32), BELIEF), [0.1, -0.2, -0.5, 0.5, -1.0, 0.5, 2.0]
     )

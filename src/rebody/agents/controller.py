@@ -10,7 +10,6 @@ from jaxtyping import Float
 
 from rebody.bodies import RobotBatch
 from rebody.control.flat import FlatPolicy
-from rebody.control.scratch import ScratchPolicy
 from rebody.control.tracker import Command, Tracker, relative
 from rebody.inference.decoder import Decoder
 from rebody.tasks import GOAL
@@ -58,21 +57,6 @@ class FlatController(Controller):
     """Follows the belief itself (thesis 6.3.2)."""
 
     policy: FlatPolicy
-
-    def see(self, batch):
-        """The joint state."""
-        return batch.joint_state()
-
-    def __call__(self, joints, x, pitch, subgoal, belief):
-        """There is no subgoal."""
-        assert belief is not None
-        return self.policy(joints, x, belief)
-
-
-class ScratchController(Controller):
-    """Follows the belief of the module that was learned with it."""
-
-    policy: ScratchPolicy
     decoder: Decoder
 
     def see(self, batch):

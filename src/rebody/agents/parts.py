@@ -15,10 +15,9 @@ from rebody.agents.belief import LiveBelief
 from rebody.agents.slots import SlotClassifier
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import Toy, make_toy
-from rebody.control.flat import FlatPolicy
+from rebody.control.flat import FlatPolicy, FlatView
 from rebody.control.high_level import HighLevelPolicy, PolicyView, TaskCode
 from rebody.control.sac import Actor, SACConfig
-from rebody.control.scratch import ScratchPolicy
 from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import StepPredictor
 from rebody.control.tracker import Tracker
@@ -91,7 +90,7 @@ class ScratchParts(eqx.Module):
     """What a scratch artifact holds: module, policy and probe, all learned on one robot."""
 
     module: InferenceModule
-    policy: ScratchPolicy
+    policy: FlatPolicy
     probe: Probe
 
 
@@ -171,7 +170,8 @@ def tracker_template(config: dict[str, Any]) -> Tracker:
 
 def flat_template(config: dict[str, Any]) -> FlatPolicy:
     """A flat policy of the right shapes, to be filled with weights."""
-    return FlatPolicy(_actor_template(config["observations"], config["actions"], config), config["reach"])
+    view = FlatView(tuple(map(tuple, config.get("places", ()))), config["reach"])
+    return FlatPolicy(_actor_template(config["observations"], config["actions"], config), view)
 
 
 def scratch_template(config: dict[str, Any]) -> ScratchParts:
@@ -181,7 +181,9 @@ def scratch_template(config: dict[str, Any]) -> ScratchParts:
     weights = np.zeros((settings.latent + 1, families), np.float32)
     return ScratchParts(
         module=InferenceModule(settings, config["actions"], jax.random.key(0)),
-        policy=ScratchPolicy(_actor_template(config["observations"], config["actions"], config), settings.places),
+        policy=FlatPolicy(
+            _actor_template(config["observations"], config["actions"], config), FlatView(settings.places)
+        ),
         probe=Probe(np.zeros(families, np.int32), weights, weights),
     )
 

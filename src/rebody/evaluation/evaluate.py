@@ -19,7 +19,7 @@ from rebody.agents.build import (
     slot_chooser,
 )
 from rebody.agents.clock import Clock, EvenClock, PredictedClock
-from rebody.agents.controller import Controller, FlatController, ScratchController, TrackerController
+from rebody.agents.controller import Controller, FlatController, TrackerController
 from rebody.agents.parts import (
     Inference,
     LoadedFlat,
@@ -188,10 +188,10 @@ def trial_controller(trial: Trial) -> Controller:
     """What moves the joints of a trial's robot."""
     if trial.agent == "flat":
         assert trial.flat is not None
-        return FlatController(trial.flat.policy)
+        return FlatController(trial.flat.policy, trial.inference.parts.module.decoder)
     if trial.agent == "scratch":
         assert trial.scratch is not None
-        return ScratchController(trial.scratch.parts.policy, trial.scratch.parts.module.decoder)
+        return FlatController(trial.scratch.parts.policy, trial.scratch.parts.module.decoder)
     assert trial.tracker is not None
     assert trial.robot is not None
     return TrackerController(trial.tracker.tracker, trial.robot.goal_ahead)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rebody.bodies import RobotBatch
+from rebody.control.flat import FlatView, told_code
 from rebody.control.sac import SACConfig
-from rebody.control.scratch import scratch_observation, told_code
 from rebody.inference import InferenceConfig
 from rebody.tasks import GOAL, reward
 from rebody.training.inference.train import tell
@@ -21,6 +21,7 @@ from rebody.types import GlobalState, Task, Transition
 ROBOTS, DECISIONS, GROUPS, START = 3, 5, 2, 15.0
 PER_DECISION, JOINTS = 2, 17
 PLACES = (("x", 10.0), ("vx", 3.0))
+VIEW = FlatView(PLACES)
 
 
 @pytest.fixture(scope="module")
@@ -100,8 +101,7 @@ def seen_at(steps, step, robot, known):
     """What the policy sees before and after a control step of the first group, by what is known at its decisions."""
     ends = (steps.joints, steps.x, step), (steps.next_joints, steps.next_x, step + 1)
     return [
-        scratch_observation(
-            PLACES,
+        VIEW(
             joints[step, robot],
             jnp.asarray(x[step, robot]),
             jax.tree.map(lambda leaf: leaf[0, robot, at // PER_DECISION], known),  # noqa: B023 (used at once)
@@ -146,6 +146,6 @@ def test_the_policy_sees_goals_from_where_it_is_and_speeds_as_they_are(state):
     belief = Task(np.zeros(1, np.int32), np.zeros(1, np.float32))  # only its shape matters here
     understood = state.module.decoder.interpret(state.module.encoder.prior(belief.target.shape))
     joints = np.zeros((1, JOINTS), np.float32)
-    here, there = (scratch_observation(PLACES, joints, np.full(1, x, np.float32), understood) for x in (0.0, 1.0))
+    here, there = (VIEW(joints, np.full(1, x, np.float32), understood) for x in (0.0, 1.0))
     moved = np.flatnonzero(np.asarray(here != there)[0])
     np.testing.assert_array_equal(moved, [JOINTS + 2])  # how far ahead the goal is

@@ -3,21 +3,17 @@
 from dataclasses import asdict
 from pathlib import Path
 
-import numpy as np
-
 from rebody.agents.build import build_agent
 from rebody.agents.controller import FlatController
 from rebody.agents.parts import Inference
-from rebody.agents.rollout import rollout_on_robot
 from rebody.bodies import RobotSpec
 from rebody.control.flat import FlatPolicy
 from rebody.store import save_artifact, tree_hash
-from rebody.tasks import family_index
-from rebody.tasks.figures import final_error
 from rebody.training.card import card
 from rebody.training.flat.config import FlatConfig
+from rebody.training.held_out import act, figures_of, rows_of
+from rebody.training.minds import tasks_within
 from rebody.training.run import Run
-from rebody.types import Task
 
 TASKS = 100
 """Held-out tasks."""
@@ -25,20 +21,11 @@ DECISIONS = 200
 
 
 def measure(policy: FlatPolicy, module: Inference, spec: RobotSpec) -> dict[str, float]:
-    """Final error on held-out tasks of the module's first family, return, share that fell."""
-    name, (low, high) = next(iter(module.contract.target_ranges.items()))
-    target = np.random.default_rng(2**31 - 1).uniform(low, high, TASKS).astype(np.float32)
-    shape = (DECISIONS, TASKS)
-    tasks = Task(np.full(shape, family_index(name), np.int32), np.broadcast_to(target, shape).copy())
-    agent, seeds = build_agent("flat", module), np.arange(TASKS)
-    episodes = rollout_on_robot(agent, FlatController(policy), spec, tasks, module.contract.reward, seeds)
-    errors = final_error(Task(tasks.family[-1], target), episodes.state)
-    return {
-        "median error": float(np.median(errors)),
-        "p95 error": float(np.percentile(errors, 95)),
-        "return": float(np.sum(episodes.reward, axis=0).mean()),
-        "fell": float(np.mean(episodes.fell)),
-    }
+    """Final error on held-out tasks of each family, return, share that fell."""
+    controller = FlatController(policy, module.parts.module.decoder)
+    tasks = tasks_within(module, spec.reach)
+    agent, form = build_agent("flat", module), module.contract.reward
+    return figures_of(*act(agent, controller, spec, tasks, form, (DECISIONS, TASKS)))
 
 
 def save_flat(policy: FlatPolicy, module: Inference, spec: RobotSpec, config: FlatConfig, run: Run, seed: int) -> Path:
@@ -49,7 +36,8 @@ def save_flat(policy: FlatPolicy, module: Inference, spec: RobotSpec, config: Fl
         "robot": spec.name,
         "inference": module.name,
         "inference_hash": tree_hash(module.parts.module),
-        "reach": policy.reach,
+        "reach": policy.view.reach,
+        "places": policy.view.places,
         "observations": actor.observations,
         "actions": actor.actions,
         "hidden": config.sac.hidden,
@@ -57,12 +45,7 @@ def save_flat(policy: FlatPolicy, module: Inference, spec: RobotSpec, config: Fl
         "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
     }
     condition = f"{TASKS} held-out tasks, 20 s"
-    rows = {
-        f"median final error, {condition}": f"{figures['median error']:.4f}",
-        f"95th percentile, {condition}": f"{figures['p95 error']:.4f}",
-        f"return, {condition}": f"{figures['return']:.1f}",
-        "fell": f"{100 * figures['fell']:.1f} %",
-    }
+    rows = rows_of(figures, condition)
     steps = config.iterations * config.steps * config.robots
     what = (
         f"Flat policy of '{spec.name}': (joint state, x, belief of '{module.name}') -> joint action, without "

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int, PRNGKeyArray
 from rebody.agents.parts import Inference, load_flat, load_inference
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
-from rebody.control.flat import FlatPolicy, flat_observation
+from rebody.control.flat import FlatPolicy, FlatView
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.tracker import slots_of
 from rebody.errors import RebodyError
@@ -135,8 +135,8 @@ def collect(
 
 def observe(batch: RobotBatch, belief: Belief, module: Inference) -> Float[np.ndarray, "robot feature"]:
     """What the flat policy sees of each robot."""
-    joints = batch.joint_state()
-    return np.asarray(flat_observation(joints, batch.x.astype(np.float32), belief, reach(module)))
+    understood = module.parts.module.decoder.interpret(belief)
+    return np.asarray(view(module)(batch.joint_state(), batch.x.astype(np.float32), understood))
 
 
 def initial_state(
@@ -159,14 +159,15 @@ def initial_state(
     )
 
 
-def reach(module: Inference) -> float:
-    """How far the module's tasks take a robot, in the unit of their targets."""
-    return max(abs(end) for ends in module.contract.target_ranges.values() for end in ends)
+def view(module: Inference) -> FlatView:
+    """What the policy sees; x as a share of how far the module's tasks take a robot, where no places are said."""
+    farthest = max(abs(end) for ends in module.contract.target_ranges.values() for end in ends)
+    return FlatView(module.parts.high_level.view.places, farthest)
 
 
 def flat_policy(state: RunState, module: Inference) -> FlatPolicy:
     """The averaged actor."""
-    return FlatPolicy(state.sac.averaged_actor, reach(module))
+    return FlatPolicy(state.sac.averaged_actor, view(module))
 
 
 @eqx.filter_jit

@@ -3,8 +3,10 @@
 from dataclasses import dataclass, field, replace
 
 from rebody.bodies.robot import Reach
+from rebody.control.flat import FlatView
 from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
+from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.presets import goal_velocity
@@ -41,6 +43,16 @@ class ScratchConfig:
     its distance drowns all that a step is worth, as long as a goal is not told from another one."""
     sac: SACConfig = field(default_factory=lambda: SACConfig(projections=8, decay_updates=195_000))
     """Hyperparameters of soft actor-critic."""
+
+    def __post_init__(self):
+        """RebodyError where a belief cannot say what who is told goes by."""
+        if not self.inference.places:
+            raise RebodyError("--inference.kinds must be at least 1: a told task is put as a belief about places.")
+
+    @property
+    def view(self) -> FlatView:
+        """What the policy sees."""
+        return FlatView(self.inference.places)
 
     def meta(self, reach: Reach) -> MetaConfig:
         """The toy's settings for episodes of robots: `goal-velocity` within reach, one Gaussian as the prior."""

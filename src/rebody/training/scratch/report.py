@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from rebody.agents.agent import FlatAgent
-from rebody.agents.controller import ScratchController
+from rebody.agents.controller import FlatController
 from rebody.agents.parts import ScratchParts
 from rebody.agents.rollout import Episodes
 from rebody.bodies import RobotSpec
@@ -35,7 +35,7 @@ def measure(parts: ScratchParts, meta: MetaConfig, spec: RobotSpec) -> dict[str,
 def act_on(parts: ScratchParts, meta: MetaConfig, spec: RobotSpec, *, seed: int) -> tuple[Task, Episodes]:
     """Robots on held-out tasks."""
     agent = FlatAgent(inferrer=parts.module.encoder, reader=parts.probe, stride=1)
-    controller = ScratchController(parts.policy, parts.module.decoder)
+    controller = FlatController(parts.policy, parts.module.decoder)
     return act(agent, controller, spec, meta.tasks, meta.reward, (DECISIONS, TASKS), seed)
 
 

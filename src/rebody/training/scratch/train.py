@@ -18,9 +18,8 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from rebody.agents.parts import ScratchParts, load_scratch
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
-from rebody.control.high_level import Places
+from rebody.control.flat import FlatPolicy, FlatView, told_code
 from rebody.control.sac import Actor, SACBatch, SACState
-from rebody.control.scratch import ScratchPolicy, observed, scratch_observation, told_code
 from rebody.inference.module import InferenceModule
 from rebody.inference.prior import SplitPrior, unit_gaussian
 from rebody.inference.probe import Probe
@@ -151,10 +150,10 @@ def hold(
     key: PRNGKeyArray,
 ) -> list[ControlSteps]:
     """The control steps of a decision, all by the same belief."""
-    understood, steps, places = understand(module, minds, config), [], config.inference.places
+    understood, steps = understand(module, minds, config), []
     for step in range(batch.spec.steps_per_decision):
         joints, x, before = batch.joint_state(), batch.x.astype(np.float32), batch.qpos.copy()
-        action = _explore(actor, places, joints, x, understood, jax.random.fold_in(key, step))
+        action = _explore(actor, config.view, joints, x, understood, jax.random.fold_in(key, step))
         batch.step(np.asarray(action))
         seen = ControlSteps(
             joints=joints,
@@ -205,7 +204,7 @@ def sample_steps(
     def observation(joints, x, step):
         at = group, robot, step // per_decision
         held = jax.tree.map(lambda yes, no: jnp.where(is_told[:, None], yes[at], no[at]), told, believed)
-        return scratch_observation(config.inference.places, joints, x, held)
+        return config.view(joints, x, held)
 
     return SACBatch(
         observation=observation(chosen.joints, chosen.x, step),
@@ -223,7 +222,7 @@ def initial_state(
     module_key, sac_key = jax.random.split(key)
     actions, joints = batch.spec.model.nu, batch.joint_state().shape[-1]
     module = InferenceModule(config.inference, actions, module_key)
-    seen = observed(joints, config.inference.places)
+    seen = config.view.size(joints, config.inference.latent)
     policy = sac.initial_state(seen, actions, config.sac, sac_key)
     if init_from is not None:
         parts = load_scratch(init_from).parts
@@ -262,7 +261,7 @@ def trained_parts(state: RunState, meta: MetaConfig) -> ScratchParts:
     """What is kept of a run, its probe not yet fitted."""
     unfitted = jnp.zeros((meta.inference.latent + 1, len(meta.tasks.families)))
     probe = Probe(jnp.asarray(meta.tasks.families), unfitted, unfitted)
-    return ScratchParts(state.module, ScratchPolicy(state.sac.averaged_actor, meta.inference.places), probe)
+    return ScratchParts(state.module, FlatPolicy(state.sac.averaged_actor, FlatView(meta.inference.places)), probe)
 
 
 @eqx.filter_jit
@@ -274,7 +273,7 @@ def understand(module: InferenceModule, minds: Minds, config: ScratchConfig) -> 
 
 
 @eqx.filter_jit
-def _explore(actor: Actor, places: Places, joints, x, understood: Belief, key: PRNGKeyArray):
-    observation = scratch_observation(places, joints, x, understood)
+def _explore(actor: Actor, view: FlatView, joints, x, understood: Belief, key: PRNGKeyArray):
+    observation = view(joints, x, understood)
     decides = jnp.arange(len(x))[:, None] % DECIDES_EVERY == 0
     return jnp.where(decides, actor(observation), actor.sample(observation, key)[0])
