@@ -37,7 +37,7 @@ def main() -> None:
     toy = Trial("reuse", module, None, None)
     show("point mass", toy, "position-toy.json", 1, [agent for agent in PARTS if agent != "flat"])
     cheetah = Trial(
-        "reuse", module, load_robot("cheetah"), load_tracker("tracker-cheetah"), flat=load_flat("flat-cheetah")
+        "reuse", module, load_robot("cheetah"), load_tracker("tracker-cheetah"), flat=load_flat("flat-position-cheetah")
     )
     results = show("cheetah", cheetah, "position-cheetah.json", seeds, list(PARTS))
     print_share(results)

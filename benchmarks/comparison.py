@@ -1,4 +1,4 @@
-"""Ways to act on a robot, side by side: one table, one page (thesis 6.5.3).
+"""Ways to act on a robot, side by side: one table, one picture, one page (thesis 6.5.3).
 
     .venv/bin/python benchmarks/comparison.py [--robots cheetah ...] [--inference goal-velocity ...] [--seeds 1]
 
@@ -9,14 +9,17 @@ in `--out`, has intervals, pictures and every episode.
 
 import argparse
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 from agents import cell
+from rebody.agents.build import AGENTS
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, read_results, save_results
 from rebody.evaluation.evaluate import Trial
 from rebody.report.page import find, write_page
+from rebody.report.style import figure
 from rebody.store import load_artifact
 from rebody.tasks.task_file import read_tasks
 
@@ -24,10 +27,25 @@ TASKS = Path(__file__).parent / "tasks"
 WITHOUT_MODULE = ("idle", "scratch", "bayes", "oracle")
 WITH_MODULE = ("reuse", "readout", "retrain", "flat")
 MODULES = ("goal-velocity", "goal-velocity-noise-0", "goal-velocity-noise-0.1", "goal-velocity-noise-0.2")
+FAMILIES = {"goal": "m", "velocity": "m/s"}
 COLUMNS = (
     "robot", "module", "agent", "goal: median error [m]", "velocity: median error [m/s]", "return",
     "base task right [%]", "fell [%]", "robot steps [million]", "training [min]",
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Row:
+    """A way to act on a robot, and what came of it."""
+
+    robot: str
+    module: str
+    agent: str
+    results: Results
+    steps: float
+    """Control steps that the robot took for all that was trained on it [million]."""
+    minutes: float
+    """How long that took."""
 
 
 def main() -> None:
@@ -37,37 +55,31 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("runs/comparison"))
     arguments = parser.parse_args()
+    first, rows = arguments.inference[0], []
     print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}")
     for robot in arguments.robots:
-        ways = [(arguments.inference[0], agent) for agent in WITHOUT_MODULE]
+        ways = [(first, agent) for agent in WITHOUT_MODULE]
         ways += [(module, agent) for module in arguments.inference for agent in WITH_MODULE]
         for module, agent in ways:
-            compare(TrialOptions(robot=robot, inference=module, agent=agent), arguments.seeds, arguments.out)
+            options = TrialOptions(robot=robot, inference=module, agent=agent)
+            try:
+                row = compare(options, arguments.seeds, arguments.out)
+            except RebodyError as error:
+                print(f"{robot}, {module}, {agent}: left out, {error}", file=sys.stderr)
+            else:
+                rows.append(row)
+                print(f"| {' | '.join(cells(row))} |", flush=True)
+    draw([row for row in rows if row.module == first], arguments.out / "comparison.png")
     page = arguments.out / "comparison.html"
     write_page([find(str(arguments.out))], page)
     print(f"\n{page}")
 
 
-def compare(options: TrialOptions, seeds: int, out: Path) -> None:
-    """Print a row, if there are the parts for it."""
-    try:
-        trial = options.load()
-        results = judge(trial, out / f"{options.robot}-{trial.inference.name}-{options.agent}-{seeds}.json", seeds)
-    except RebodyError as error:
-        print(f"{options.robot}, {options.inference}, {options.agent}: left out, {error}", file=sys.stderr)
-        return
-    families, steps_and_minutes = results.summary["families"], costs(trial)
-    cells = [
-        options.robot,
-        "" if options.agent in WITHOUT_MODULE else options.inference,
-        options.agent,
-        *(cell(families[family]["median_error"]) for family in ("goal", "velocity")),
-        f"{sum(episode.return_ for episode in results.episodes) / len(results.episodes):.1f}",
-        f"{100 * min(families[family]['base_task_right']['value'] for family in families):.1f}",
-        f"{100 * results.summary['fell']['value']:.1f}",
-        *(f"{value:.1f}" for value in steps_and_minutes),
-    ]
-    print(f"| {' | '.join(cells)} |", flush=True)
+def compare(options: TrialOptions, seeds: int, out: Path) -> Row:
+    """Judge one way; RebodyError if there are no parts for it."""
+    trial = options.load()
+    results = judge(trial, out / f"{options.robot}-{trial.inference.name}-{options.agent}-{seeds}.json", seeds)
+    return Row(options.robot, options.inference, options.agent, results, *costs(trial))
 
 
 def judge(trial: Trial, path: Path, seeds: int) -> Results:
@@ -93,6 +105,45 @@ def costs(trial: Trial) -> tuple[float, float]:
         steps += training["robots"] * in_iteration * training["iterations"] * per_step / 1e6
         seconds += training["wall_s"]
     return steps, seconds / 60
+
+
+def cells(row: Row) -> list[str]:
+    """A row of the table."""
+    families, episodes = row.results.summary["families"], row.results.episodes
+    return [
+        row.robot,
+        "" if row.agent in WITHOUT_MODULE else row.module,
+        row.agent,
+        *(cell(families[family]["median_error"]) for family in FAMILIES),
+        f"{sum(episode.return_ for episode in episodes) / len(episodes):.1f}",
+        f"{100 * min(families[family]['base_task_right']['value'] for family in families):.1f}",
+        f"{100 * row.results.summary['fell']['value']:.1f}",
+        f"{row.steps:.1f}",
+        f"{row.minutes:.1f}",
+    ]
+
+
+def draw(rows: list[Row], path: Path) -> None:
+    """Errors of every agent, a colour per robot, and the robot steps that each took to train."""
+    agents = [agent for agent in reversed(AGENTS) if any(row.agent == agent for row in rows)]
+    robots = list(dict.fromkeys(row.robot for row in rows))
+    with figure(path, 1, 3, size=(12.0, 3.8)) as (_, (*by_family, steps)):
+        for i, robot in enumerate(robots):
+            of_robot = [row for row in rows if row.robot == robot]
+            # side by side in the line of their agent
+            lines = [agents.index(row.agent) + 0.15 * (i - (len(robots) - 1) / 2) for row in of_robot]
+            for axes, (family, unit) in zip(by_family, FAMILIES.items(), strict=True):
+                figures = [row.results.summary["families"][family]["median_error"] for row in of_robot]
+                values = [of["value"] for of in figures]
+                ends = [[abs(of[end] - of["value"]) for of in figures] for end in ("low", "high")]
+                axes.errorbar(values, lines, xerr=ends, fmt="o", ms=4, color=f"C{i}", label=robot)
+                axes.set(xlabel=f"{family}: median error [{unit}]", xscale="log")
+            steps.plot([row.steps for row in of_robot], lines, "o", ms=4, color=f"C{i}")
+        steps.set(xlabel="robot steps of its training [million]")
+        for axes in (*by_family, steps):
+            axes.set_yticks(range(len(agents)), agents if axes is by_family[0] else [])
+            axes.grid(axis="x", color="#eeeeee")
+        by_family[0].legend(frameon=False, fontsize=8)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import tyro
 
 from rebody.agents.build import AGENTS, HORIZON, SlotsBy, check_agent
 from rebody.agents.parts import (
+    LoadedFlat,
     LoadedHighLevel,
     LoadedScratch,
     LoadedStepPredictor,
@@ -39,7 +40,7 @@ class TrialOptions:
     tracker: str | None = None
     """Tracker artifact; default tracker-ROBOT."""
     flat: str | None = None
-    """Policy of agent `flat`; default flat-ROBOT."""
+    """Policy of agent `flat`; default flat-INFERENCE-ROBOT."""
     scratch: str | None = None
     """Artifact of agent `scratch`; default scratch-ROBOT."""
     high_level: str | None = None
@@ -76,7 +77,7 @@ class TrialOptions:
             robot=robot,
             inference=inference,
             tracker=load_tracker(self.tracker or f"tracker-{robot.name}") if robot else None,
-            flat=load_flat(self.flat or f"flat-{robot.name}") if robot and self.agent == "flat" else None,
+            flat=self._flat(robot),
             scratch=self._scratch(robot),
             high_level=self._high_level(robot),
             slots=load_slots_of(inference, self.classifier) if bridged else None,
@@ -97,6 +98,11 @@ class TrialOptions:
         if self.robot == POINT_MASS:
             raise RebodyError("--stride predicted counts control steps of a robot; a point mass has none.")
         return 1
+
+    def _flat(self, robot: RobotSpec | None) -> LoadedFlat | None:
+        if robot is None or self.agent != "flat":
+            return None
+        return load_flat(self.flat or f"flat-{Path(self.inference).name}-{robot.name}")
 
     def _scratch(self, robot: RobotSpec | None) -> LoadedScratch | None:
         if robot is None or self.agent != "scratch":

@@ -31,7 +31,7 @@ class View:
     tracker: str | None = None
     """Tracker artifact of that robot; default tracker-ROBOT."""
     flat: str | None = None
-    """Flat policy of that robot; default flat-ROBOT."""
+    """Flat policy of that robot and module; default flat-INFERENCE-ROBOT."""
     classifier: str | None = None
     """Classifier of that module; default classifier-INFERENCE."""
     port: int = 8080
@@ -65,7 +65,7 @@ class View:
             inference=choice.inference,
             agent=choice.agent,
             tracker=self.tracker if of_robot else None,
-            flat=self.flat if of_robot else None,
+            flat=self.flat if of_robot and of_module else None,
             classifier=self.classifier if of_module else None,
         ).load()
 

@@ -104,7 +104,7 @@ FIGURES = {
             first.flat_training_log,
             first.train_flat_again,
             first.draw_flat_training,
-            "Learning `flat-cheetah`. Left: the task's reward per decision while it explores, mean of two "
+            "Learning `flat-position-cheetah`. Left: the task's reward per decision while it explores, mean of two "
             "episodes. Right: final error on 100 held-out goals in +-10 m.",
         ),
         ThesisFigure(

@@ -100,12 +100,12 @@ def draw_toy_training(data: Data, path: Path, text: str) -> None:
 def flat_training_log() -> Data:
     """Of the shipped flat policy, whose log calls errors by other names."""
     of_today = {f"evaluation/{name} error": f"evaluation/goal {name}" for name in ("median", "p95")}
-    return {of_today.get(name, name): values for name, values in training_log("flat-cheetah", "flat").items()}
+    return {of_today.get(name, name): values for name, values in training_log("flat-position-cheetah", "flat").items()}
 
 
 def train_flat_again(runs: Path) -> Data:
     """Of a flat policy trained anew."""
-    out = runs / "flat-cheetah"
+    out = runs / "flat-position-cheetah"
     train_flat("cheetah", "position", FlatConfig(), out, 0, resume=True)
     return training_log(out, "flat")
 
@@ -158,7 +158,9 @@ def on_toy() -> Data:
 
 def flat_on_cheetah() -> Data:
     """The flat policy on the cheetah."""
-    trial = Trial("flat", load_inference("position"), load_robot("cheetah"), None, flat=load_flat("flat-cheetah"))
+    trial = Trial(
+        "flat", load_inference("position"), load_robot("cheetah"), None, flat=load_flat("flat-position-cheetah")
+    )
     return on_goals(trial, GOALS)
 
 
