@@ -138,12 +138,12 @@ def draw(rows: list[Row], path: Path) -> None:
                 ends = [[abs(of[end] - of["value"]) for of in figures] for end in ("low", "high")]
                 axes.errorbar(values, lines, xerr=ends, fmt="o", ms=4, color=f"C{i}", label=robot)
                 axes.set(xlabel=f"{family}: median error [{unit}]", xscale="log")
-            steps.plot([row.steps for row in of_robot], lines, "o", ms=4, color=f"C{i}")
+            steps.barh(lines, [row.steps for row in of_robot], height=0.13, color=f"C{i}")
         steps.set(xlabel="robot steps of its training [million]")
         for axes in (*by_family, steps):
             axes.set_yticks(range(len(agents)), agents if axes is by_family[0] else [])
             axes.grid(axis="x", color="#eeeeee")
-        by_family[0].legend(frameon=False, fontsize=8)
+        by_family[0].legend(frameon=False, fontsize=8, loc="center right")
 
 
 if __name__ == "__main__":

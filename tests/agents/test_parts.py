@@ -9,6 +9,7 @@ import pytest
 from rebody.agents.parts import inference_template, load_flat, load_inference, load_step_predictor, load_tracker
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import FullToy, MassDamper, PositionToy, describe_toy
+from rebody.control.flat import FlatView
 from rebody.errors import RebodyError
 from rebody.store import save_artifact, tree_hash, tree_to_arrays
 
@@ -79,15 +80,19 @@ def test_a_loaded_tracker_acts_as_the_saved_one(tracker, tmp_path):
         load_inference(str(tmp_path / "t"))
 
 
-def test_a_loaded_flat_policy_acts_as_the_saved_one(flat_policy, tmp_path):
-    config = {
+@pytest.mark.parametrize(
+    ("said", "view"),
+    [({}, FlatView(reach=10.0)), ({"places": [["x", 10.0], ["vx", 3.0]]}, FlatView((("x", 10.0), ("vx", 3.0)), 10.0))],
+)
+def test_a_loaded_flat_policy_acts_as_the_saved_one(flat_policy, tmp_path, said, view):
+    config = said | {
         "robot": "cheetah", "inference_hash": "abc", "reach": 10.0, "observations": 22, "actions": 6, "hidden": [8],
         "projections": 0,
     }  # fmt: skip
     save_artifact(tmp_path / "f", kind="flat", config=config, weights=flat_policy, card="# Tiny\n", log="")
     loaded = load_flat(str(tmp_path / "f"))
     assert tree_hash(loaded.policy) == tree_hash(flat_policy)
-    assert (loaded.name, loaded.robot, loaded.inference_hash, loaded.policy.reach) == ("f", "cheetah", "abc", 10.0)
+    assert (loaded.name, loaded.robot, loaded.inference_hash, loaded.policy.view) == ("f", "cheetah", "abc", view)
     save_artifact(tmp_path / "f", kind="flat", config={"robot": "cheetah"}, weights=flat_policy, card="", log="")
     with pytest.raises(RebodyError, match="settings of artifact 'f' are not understood"):
         load_flat(str(tmp_path / "f"))
