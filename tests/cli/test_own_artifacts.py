@@ -164,7 +164,7 @@ def test_one_that_learned_everything_itself_is_judged(trained, evaluate, capsys)
 
     refused(evaluate(*parts, "--robot", "point-mass")[0], capsys, "a point mass is none")
     refused(evaluate(*parts, "--robot", "hopper")[0], capsys, "trained on 'cheetah', not on 'hopper'")
-    refused(evaluate("--agent", "scratch", "--robot", "cheetah")[0], capsys, "scratch-cheetah")
+    refused(evaluate("--agent", "scratch", "--robot", "walker")[0], capsys, "scratch-walker")
 
 
 def test_an_own_high_level_policy_is_judged(trained, evaluate, tmp_path, capsys):

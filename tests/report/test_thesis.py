@@ -60,7 +60,7 @@ SYNTHETIC = {
     "6.2": curves_of("return", "evaluation/return", "evaluation/oracle return"),
     "6.3": episodes_of(1, targets=first.THESIS_GOALS),
     "6.5": episodes_of(2),
-    "6.6": curves_of("task_reward", "evaluation/median error", "evaluation/p95 error"),
+    "6.6": curves_of("task_reward", "evaluation/goal median", "evaluation/goal p95"),
     "6.7": curves_of(*(f"evaluation/{slot} {of}" for slot in ("goal", "velocity", "stand")
         for of in ("median", "p95"))),
     "6.8": episodes_of(1, targets=(3.0,), decision_s=0.05),  # a single goal
