@@ -143,6 +143,7 @@ def draw(rows: list[Row], path: Path) -> None:
         for axes in (*by_family, steps):
             axes.set_yticks(range(len(agents)), agents if axes is by_family[0] else [])
             axes.grid(axis="x", color="#eeeeee")
+            axes.set_axisbelow(True)
         by_family[0].legend(frameon=False, fontsize=8, loc="center right")
 
 
