@@ -6,9 +6,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from rebody.control.high_level import Places, TaskCode, seen_from
+from rebody.control.high_level import Places, seen_from
 from rebody.control.sac import Actor
-from rebody.tasks.families import FAMILIES
 from rebody.types import AnyArray, Belief
 
 
@@ -50,9 +49,3 @@ class FlatPolicy(eqx.Module):
     ) -> Float[AnyArray, "*batch action"]:
         """Joint action in [-1, 1]; `understood` is what the decoder makes of a belief."""
         return self.actor(self.view(joints, x, understood))
-
-
-def told_code(places: Places) -> TaskCode:
-    """How a task is put to a policy that is told it: as a belief without doubt that speaks of these places."""
-    family_of = {family.field: index for index, family in enumerate(FAMILIES)}
-    return TaskCode(tuple((family_of[field], unit) for field, unit in places))

@@ -95,3 +95,9 @@ class TaskCode(eqx.Module):
         target = task.target[..., None] / jnp.asarray([scale for _, scale in self.scales])
         mean = jnp.concatenate([is_on, is_on * target], axis=-1)
         return Belief(mean, jnp.zeros_like(mean))
+
+
+def told_code(places: Places) -> TaskCode:
+    """How a task is put to a policy that is told it: as a belief without doubt that speaks of these places."""
+    family_of = {family.field: index for index, family in enumerate(FAMILIES)}
+    return TaskCode(tuple((family_of[field], unit) for field, unit in places))

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from rebody.bodies import RobotBatch
-from rebody.control.flat import FlatView, told_code
+from rebody.control.flat import FlatView
+from rebody.control.high_level import told_code
 from rebody.control.sac import SACConfig
+from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
 from rebody.tasks import GOAL, reward
 from rebody.training.inference.train import tell
@@ -94,7 +96,7 @@ def test_going_to_a_goal_is_paid_by_how_well_its_speed_is_held(config, meta, sta
     held = np.maximum(1 - np.abs(wanted - speed) / np.maximum(np.abs(wanted), 0.5), -0.5)
     posture = 0.5 * (1 - np.cos(steps.next_joints[..., 1])) + 0.02 * np.mean(steps.action**2, axis=-1)
     expected = 0.5 * held + 0.02 / (0.1 + np.abs(left)) - posture[:, is_goal]
-    np.testing.assert_allclose(steps.reward[:, is_goal], expected, atol=1e-3)
+    np.testing.assert_allclose(steps.reward[:, is_goal], expected, atol=1e-4)
 
 
 def seen_at(steps, step, robot, known):
@@ -140,6 +142,11 @@ def test_who_is_told_goes_by_the_truth_in_the_terms_of_a_belief(config, state):
     believed = state.module.decoder.interpret(minds.belief)
     np.testing.assert_allclose(gone_by.mean[2:], believed.mean[2:])
     np.testing.assert_allclose(gone_by.variance[2:], believed.variance[2:])
+
+
+def test_a_latent_that_says_no_places_is_refused(config):
+    with pytest.raises(RebodyError, match=r"--inference\.kinds must be at least 1"):
+        replace(config, inference=replace(config.inference, kinds=0))
 
 
 def test_the_policy_sees_goals_from_where_it_is_and_speeds_as_they_are(state):

@@ -18,7 +18,8 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from rebody.agents.parts import ScratchParts, load_scratch
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control import sac
-from rebody.control.flat import FlatPolicy, FlatView, told_code
+from rebody.control.flat import FlatPolicy, FlatView
+from rebody.control.high_level import told_code
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.inference.module import InferenceModule
 from rebody.inference.prior import SplitPrior, unit_gaussian
