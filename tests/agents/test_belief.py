@@ -88,15 +88,49 @@ def test_of_several_families_and_clusters():
 @pytest.mark.parametrize(
     ("state", "reward", "says"),
     [
-        ({"x": 0.1}, 0.5, r"reward 0\.5 cannot be"),
-        ({"x": 0.1}, float("nan"), "reward nan cannot be"),
-        ({"x": float("inf")}, -1.0, "'x' is inf"),
-        ({"vx": 1.0}, -1.0, "lacks 'x': give x"),
+        ({"x": 0.1}, float("nan"), r"decision 1: the reward is nan; give a finite number"),
+        ({"x": 0.1}, 1e300, r"decision 1: the reward is 1e\+300; give a number of at most 1e\+06"),
+        ({"x": 0.1}, "0.5", "the reward is '0.5'; give a number"),
+        ({"x": 0.1}, np.zeros(2), r"the reward has shape \(2,\); give one number"),
+        ({"x": float("inf")}, -1.0, "decision 1: the state's 'x' is inf"),
+        ({"x": 3.4e38}, -1.0, "the state's 'x' is 3.4e"),
+        ({"x": True}, -1.0, "the state's 'x' is True"),
+        ({"vx": 1.0}, -1.0, "decision 1: the state lacks 'x': give x"),
+        ([0.1], -1.0, "the state is of type list"),
     ],
 )
-def test_what_cannot_be_is_refused(state, reward, says, inference):
+def test_what_cannot_be_is_refused_and_not_taken_in(state, reward, says, inference):
+    belief = inference.begin({"x": 0.0})
+    before = belief.reading
     with pytest.raises(RebodyError, match=says):
-        inference.begin({"x": 0.0}).update(state, reward)
+        belief.update(state, reward)
+    assert belief.reading is before
+    other = inference.begin({"x": 0.0})
+    np.testing.assert_array_equal(
+        belief.update({"x": 0.1}, -3.0).latent.mean, other.update({"x": 0.1}, -3.0).latent.mean
+    )
+
+
+def test_what_was_not_heard_changes_no_belief(inference):
+    belief, other = inference.begin({"x": 0.0}), inference.begin({"x": 0.0})
+    belief.update({"x": 0.1}, -3.9)
+    held = belief.update({"x": 0.3}, None)
+    heard = belief.update({"x": 0.4}, -3.6)
+    reading = other.update({"x": 0.1}, -3.9)
+    np.testing.assert_array_equal(held.latent.mean, reading.latent.mean)
+    assert not np.array_equal(heard.latent.mean, held.latent.mean)
+    assert belief.doubts() == ()
+
+
+@pytest.mark.parametrize("impossible", [7.0, 0.5])
+def test_a_reward_that_no_task_pays_is_doubted_and_not_believed(impossible, inference):
+    belief, other = inference.begin({"x": 0.0}), inference.begin({"x": 0.0})
+    for reward in (-3.9, impossible, None):
+        belief.update({"x": 0.1}, reward)
+    other.update({"x": 0.1}, -3.9)
+    np.testing.assert_array_equal(belief.reading.latent.mean, other.reading.latent.mean)
+    (doubt,) = belief.doubts()
+    assert f"the reward was {impossible:g} in 1 decision" in doubt
 
 
 def test_a_velocity_needs_itself_or_its_position(stored_config):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rebody.bodies import camera, load_robot
+from rebody.errors import RebodyError
 
 
 @pytest.fixture
@@ -39,3 +40,24 @@ def test_leaves_the_choice_alone_where_there_is_a_display(headless, monkeypatch,
     monkeypatch.setenv(name, ":0")
     camera.choose_opengl()
     assert "MUJOCO_GL" not in os.environ
+
+
+@pytest.mark.parametrize("error", [AttributeError("no GLContext"), ImportError("EGL"), RuntimeError("no display")])
+def test_opengl_that_is_off_or_missing_is_one_message(error, monkeypatch):
+    def renderer(*_):
+        raise error
+
+    monkeypatch.setattr(camera.mujoco, "Renderer", renderer)
+    with pytest.raises(RebodyError, match="Set MUJOCO_GL to egl or osmesa"):
+        camera.Camera(load_robot("cheetah").model)
+
+
+def test_osmesa_that_is_missing_is_one_message(headless, monkeypatch):
+    def reload(_):
+        raise AttributeError("'NoneType' object has no attribute 'glGetError'")
+
+    monkeypatch.setattr(camera, "_loads", lambda library: False)
+    monkeypatch.setattr(camera.importlib, "reload", reload)
+    with pytest.raises(RebodyError, match="Set MUJOCO_GL to egl or osmesa"):
+        camera.Camera(load_robot("cheetah").model)
+    assert os.environ.pop("MUJOCO_GL") == "osmesa"

@@ -8,6 +8,7 @@ import pytest
 from rebody.bodies import RobotBatch, load_robot, shipped_robots
 from rebody.bodies.robot import Fall, Reach
 from rebody.errors import RebodyError
+from rebody.names import ROBOTS
 
 ANT = Path(__file__).parents[2] / "examples" / "ant" / "ant.toml"
 
@@ -26,6 +27,12 @@ def test_a_described_robot_can_be_used(name):
     batch.reset(np.random.default_rng(0))
     batch.step(np.zeros((2, spec.model.nu)))
     assert not batch.fallen.any()
+
+
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path):
+    text = (ROBOTS / "hopper.toml").read_text(encoding="utf-8")
+    (tmp_path / "hopper.toml").write_text(text, encoding="utf-8-sig")
+    assert load_robot(str(tmp_path / "hopper.toml")) == load_robot("hopper")
 
 
 @pytest.mark.parametrize("name", ["hopper", "walker"])

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,73 @@ def test_a_doubt_is_said(tmp_path, capsys):
     assert "doubtful: velocity_m_s says 1e+03 where position_m moves at 1 per second" in capsys.readouterr().out
 
 
+def damage(rows):
+    """Of the shipped log: something wrong in seven rows, and half a second without any."""
+    cells = [row.split(",") for row in rows]
+    cells[30][1], cells[77][4], cells[120][1] = "nan", "", "1e12"
+    cells[150] = cells[149]
+    cells[220][0], cells[260][0] = "0.5", "99999"
+    cells[300].pop()
+    return [",".join(row) for i, row in enumerate(cells) if not 340 <= i < 350]
+
+
+def test_damaged_rows_are_left_out_and_the_belief_is_the_same(tmp_path, capsys):
+    header, *rows = LOG.read_text().splitlines()
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join([header, *damage(rows)]))
+    assert run(["infer", str(log)]) == 2
+    assert "line 32: position_m is 'nan', not a finite number; --skip-bad-rows" in capsys.readouterr().err
+    believed = {}
+    for path, options in ((LOG, []), (log, ["--skip-bad-rows"])):
+        assert run(["infer", str(path), *options, "--out", str(tmp_path / path.stem)]) == 0
+        believed[path] = rows_of(tmp_path / path.stem / "belief.csv")
+    printed = capsys.readouterr().out
+    assert (
+        "note: skipped 7 of 391 rows: 1 not finite, 1 unreadable, 1 too large, 1 with a wrong number of cel" in printed
+    )
+    assert "2 with a repeated time stamp, 1 with a time stamp out of order." in printed
+    assert "note: 1 gap of more than 0.3 s without a sample, 0.55 s in all: the belief hears nothing there." in printed
+    for whole, damaged in zip(believed[LOG], believed[log], strict=True):
+        in_gap = 16.95 < float(whole["time_s"]) < 17.55
+        assert (damaged["reward"] == "") == in_gap
+        if float(whole["time_s"]) > 1.5:
+            assert damaged["inferred_family"] == whole["inferred_family"]
+    for i in (90, 190, 199):
+        assert float(believed[log][i]["inferred_target"]) == pytest.approx(
+            float(believed[LOG][i]["inferred_target"]), abs=0.05
+        )
+
+
+def test_semicolons_decimal_commas_and_milliseconds(tmp_path, capsys):
+    """The error names what reads them, and then the belief is the same to the last digit."""
+    header, *rows = (row.split(",") for row in LOG.read_text().splitlines())
+    rows = [[f"{1000 * float(time):g}", *others] for time, *others in rows]
+    log = tmp_path / "log.csv"
+    log.write_text("\ufeff" + "\r\n".join(";".join(row).replace(".", ",") for row in [header, *rows]))
+    assert run(["infer", str(log)]) == 2
+    options = "--delimiter semicolon --decimal-comma --time-unit ms"
+    assert f"Read it with {options}." in capsys.readouterr().err
+    assert run(["infer", str(log), *options.split(), "--out", str(tmp_path / "other")]) == 0
+    assert run(["infer", str(LOG), "--out", str(tmp_path / "plain")]) == 0
+    assert (tmp_path / "other" / "belief.csv").read_bytes() == (tmp_path / "plain" / "belief.csv").read_bytes()
+
+
+def test_a_log_from_elsewhere_begins_at_zero(tmp_path, capsys):
+    header, *rows = (row.split(",") for row in LOG.read_text().splitlines())
+    log = tmp_path / "log.csv"
+    with log.open("w", newline="") as file:
+        moved = [[f"{1.7e9 + float(time):.2f}", float(x) + 100, *others] for time, x, *others in rows]
+        csv.writer(file).writerows([header, *moved])
+    assert run(["infer", str(log), "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "note: time_s begins at 1700000000 s" in printed
+    assert "note: position_m begins at 100 m" in printed
+    assert "doubtful" not in printed
+    row = rows_of(tmp_path / "belief.csv")[90]
+    assert (row["time_s"], row["inferred_family"]) == ("9.1", "goal")
+    assert float(row["inferred_target"]) == pytest.approx(6.0, abs=0.3)
+
+
 @pytest.mark.parametrize(
     ("content", "options", "says"),
     [
@@ -88,9 +156,14 @@ def test_what_the_user_can_mend_is_one_message(content, options, says, tmp_path,
     assert [path.name for path in tmp_path.iterdir()] == ([] if content is None else ["log.csv"])
 
 
-def test_a_log_is_not_written_over(tmp_path, capsys):
-    log = tmp_path / "belief.csv"
+@pytest.mark.parametrize("place", [lambda log, there: None, os.symlink, os.link], ids=["itself", "symlink", "link"])
+@pytest.mark.parametrize("name", ["belief.csv", "belief.png"])
+def test_a_log_is_not_written_over(name, place, tmp_path, capsys):
+    log = there = tmp_path / name
+    if place in (os.symlink, os.link):
+        log = tmp_path / "log.csv"
     log.write_text(LOG.read_text())
+    place(log, there)
     assert run(["infer", str(log), "--out", str(tmp_path)]) == 2
     assert "would write over the log" in capsys.readouterr().err
-    assert log.read_text() == LOG.read_text()
+    assert log.read_text() == there.read_text() == LOG.read_text()

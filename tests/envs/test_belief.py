@@ -14,7 +14,8 @@ NO_BOUNDS = "ignore:.*A Box observation space m(in|ax)imum value is:UserWarning"
 
 
 def believing(name, control_dt, inference="goal-velocity", **functions):
-    return BeliefObservation(gymnasium.make(name), inference, control_dt=control_dt, **functions)
+    settings = {"reward": "relative"} if name.startswith("rebody/") else {}
+    return BeliefObservation(gymnasium.make(name, **settings), inference, control_dt=control_dt, **functions)
 
 
 @pytest.mark.filterwarnings(NO_BOUNDS)
@@ -69,13 +70,40 @@ def test_somebody_elses_environment():
     assert env.observation_space.contains(observation)
 
 
-def test_a_reward_that_no_task_gives_is_refused():
+def test_a_reward_that_no_task_pays_is_doubted():
     env = BeliefObservation(
         gymnasium.make("CartPole-v1"), "position", control_dt=0.1, observe=lambda observation, info: {"x": 0.0}
     )
     env.reset(seed=0)
-    with pytest.raises(RebodyError, match="reward 1 cannot be"):
+    env.step(0)
+    (doubt,) = env.doubts
+    assert "the reward was 1 in 1 decision" in doubt
+    np.testing.assert_array_equal(env.reading.latent.mean, np.zeros(2))
+
+
+def test_nan_is_refused_and_none_is_not_heard():
+    env = BeliefObservation(
+        gymnasium.make("CartPole-v1"),
+        "position",
+        control_dt=0.1,
+        observe=lambda observation, info: {"x": 0.0},
+        task_reward=lambda observation, reward, info: paid.pop(0),
+    )
+    paid = [None, float("nan")]
+    with pytest.raises(RebodyError, match="call reset"):
+        _ = env.reading
+    env.reset(seed=0)
+    env.step(0)
+    assert env.doubts == ()
+    np.testing.assert_array_equal(env.reading.latent.mean, np.zeros(2))
+    with pytest.raises(RebodyError, match="the reward is nan"):
         env.step(0)
+
+
+@pytest.mark.parametrize("control_dt", [0.0, -0.1, float("nan")])
+def test_a_step_takes_time(control_dt):
+    with pytest.raises(RebodyError, match="control_dt is"):
+        believing("rebody/PointMass-v0", control_dt)
 
 
 @pytest.mark.parametrize("control_dt", [0.03, 0.2, 0.008])

@@ -106,9 +106,9 @@ def test_tasks_are_drawn_from_the_base_tasks():
         ({"family": "goal", "target": 1.0, "speed": 1}, "'speed'; give 'family' and 'target'"),
         ({"family": "gaol", "target": 1.0}, r"did you mean 'goal'\?"),
         ({"family": 3, "target": 1.0}, "unknown task family '3'"),
-        ({"family": "goal", "target": "far"}, "'far' is no finite number"),
-        ({"family": "goal", "target": float("nan")}, "nan is no finite number"),
-        ({"family": "goal", "target": None}, "None is no finite number"),
+        ({"family": "goal", "target": "far"}, "the target is 'far'; give a number"),
+        ({"family": "goal", "target": float("nan")}, "the target is nan; give a finite number"),
+        ({"family": "goal", "target": None}, "the target is None; give a number"),
     ],
 )
 def test_malformed_options(options, message):
@@ -167,3 +167,27 @@ def test_a_vector_environment_draws_each_body(name):
     envs.close()
     assert len(pictures) == 3
     assert all(picture.shape == (480, 640, 3) and picture.dtype == np.uint8 for picture in pictures)
+
+
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize(
+    "spoil", [lambda a: a * np.nan, lambda a: a.astype(float) + 1e39, lambda a: a[:-1], lambda a: None, str]
+)
+def test_an_action_that_cannot_be_is_refused_and_nothing_moves(name, spoil):
+    env = gymnasium.make(name, disable_env_checker=True)
+    env.reset(seed=0)
+    *_, info = env.step(env.action_space.sample())
+    with pytest.raises(RebodyError, match="the action"):
+        env.unwrapped.step(spoil(env.action_space.sample()))
+    assert env.unwrapped._info() == info
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_many_bodies_need_an_action_each(name):
+    envs = gymnasium.make_vec(name, num_envs=3, vectorization_mode="vector_entry_point")
+    envs.reset(seed=0)
+    (actions,) = envs.single_action_space.shape
+    for shape in ((actions,), (1, actions), (3, actions + 1), (3,)):
+        if shape != (3, actions):
+            with pytest.raises(RebodyError, match=rf"the array of actions has shape .*, not \(3, {actions}\)"):
+                envs.step(np.zeros(shape))

@@ -31,7 +31,7 @@ def run_of(fields, families, latent=3, clusters=0):
         return Reading(believed, 2.0, base_tasks, shares, Belief(mean, np.ones(latent)))
 
     decisions = Decisions(time, {field: np.sin(time) for field in fields}, -np.ones(TIME))
-    return BeliefOverTime("tiny", decisions, [reading(i) for i in range(TIME)])
+    return BeliefOverTime("tiny", decisions, [reading(i) for i in range(TIME)], believed=TIME)
 
 
 @pytest.mark.parametrize(

@@ -65,3 +65,24 @@ def test_the_plot_below_fits_and_shows_how_far_it_is(trial):
     early, late = (video._plot(episode, until) for until in (2, 30))
     assert early.shape == late.shape == (PLOT_HEIGHT, WIDTH, 3)
     assert (early != late).any()
+
+
+@pytest.mark.parametrize("program", ["nowhere/ffmpeg", "/bin/true", "/bin/false"])
+def test_without_an_ffmpeg_that_runs_no_episode_is_run(program, trial, tmp_path, monkeypatch):
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", program)
+    monkeypatch.setattr(video, "evaluate", None)
+    with pytest.raises(RebodyError, match=r"videos need ffmpeg.*pip install --force-reinstall imageio-ffmpeg"):
+        film(trial, TaskSpec("goal", 2.0), tmp_path / "film.mp4")
+
+
+@pytest.mark.parametrize("error", [OSError("Broken pipe"), RuntimeError("No valid H.264 encoder"), IndexError()])
+def test_an_ffmpeg_that_fails_is_one_message(error, trial, tmp_path, monkeypatch):
+    def failing(*_, **__):
+        yield
+        raise error
+
+    monkeypatch.setattr(video.imageio_ffmpeg, "write_frames", failing)
+    monkeypatch.setattr(video, "_frames", lambda *_: iter([(1.0, np.zeros((8, 8, 3), np.uint8))]))
+    with pytest.raises(RebodyError, match="ffmpeg could not write a video into"):
+        film(trial, TaskSpec("goal", 2.0), tmp_path / "film.mp4")
+    assert list(tmp_path.iterdir()) == []

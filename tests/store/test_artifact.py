@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rebody.errors import RebodyError
-from rebody.store import artifact, load_artifact, save_artifact, shipped_artifacts
+from rebody.store import artifact, load_artifact, recover, save_artifact, save_checkpoint, shipped_artifacts
 
 CONFIG = {"fields": ["x", "vx"], "window": 16}
 LOG = "iteration,loss\n1,0.5\n"
@@ -128,35 +128,36 @@ def test_replacing_keeps_foreign_files_and_leaves_nothing_behind(folder):
     assert list(folder.parent.iterdir()) == [folder]
 
 
-@pytest.mark.parametrize("failing", ["write", "step aside", "move in"])
-def test_failure_midway_leaves_the_old_one(folder, monkeypatch, failing):
-    real_rename, real_write = os.rename, Path.write_bytes
+def test_a_name_with_a_separator_is_a_folder_of_ones_own(shipped, folder, tmp_path, monkeypatch):
+    own = save(tmp_path / "here" / "tracker-cheetah", 3.0, "tracker")
+    monkeypatch.chdir(own.parent)
+    for reference in ("./tracker-cheetah", "tracker-cheetah/", own, str(own)):
+        assert load_artifact(reference).path == own
+    assert load_artifact("tracker-cheetah").path == tmp_path / "tracker-cheetah"
 
-    def rename(source, target):
-        moving_in = Path(source).name == ".mine.new"
-        if (failing == "move in" and moving_in) or (failing == "step aside" and Path(source) == folder):
-            raise OSError("no")
-        real_rename(source, target)
 
-    def write_bytes(path, data):
-        if failing == "write" and path.name == "card.md":
-            raise OSError("no")
-        return real_write(path, data)
+def test_an_unfinished_run_says_what_to_do(tmp_path):
+    save_checkpoint(tmp_path / "run" / "checkpoint", {"w": np.ones(1)}, {})
+    with pytest.raises(RebodyError, match=r"holds an unfinished run: go on with it .* `--resume --finish`"):
+        load_artifact(tmp_path / "run")
 
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "rename", rename)
-        patch.setattr(Path, "write_bytes", write_bytes)
-        with pytest.raises(OSError, match="no"):
-            save(folder, 2.0)
+
+def test_a_link_that_leaves_the_folder_is_refused(folder, tmp_path):
+    (folder / "card.md").rename(tmp_path / "card.md")
+    (folder / "card.md").symlink_to(tmp_path / "card.md")
+    with pytest.raises(RebodyError, match=r"card\.md is a link that leaves"):
+        load_artifact(folder)
+    (folder / "kept").mkdir()
+    (tmp_path / "card.md").rename(folder / "kept" / "card.md")
+    (folder / "card.md").unlink()
+    (folder / "card.md").symlink_to("kept/card.md")
     assert bias(folder) == 1.0
-    assert list(folder.parent.iterdir()) == [folder]
 
 
-def test_killed_between_the_renames_the_old_one_is_read_and_the_next_save_mends(folder):
-    folder.rename(folder.with_name(".mine.old"))
-    save(folder.with_name(".mine.new"), 9.0)
-    assert bias(folder) == 1.0
-    assert load_artifact(folder, "inference").name == "mine"
-    save(folder, 2.0)
-    assert bias(folder) == 2.0
-    assert list(folder.parent.iterdir()) == [folder]
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_a_pipe_is_refused_at_once(folder, name):
+    (folder / name).unlink()
+    os.mkfifo(folder / name)
+    for attempt in (load_artifact, recover, save):
+        with pytest.raises(RebodyError, match=f"{name} is a pipe"):
+            attempt(folder)

@@ -84,10 +84,25 @@ def test_failure_midway_leaves_the_old_one(folder, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(os, "replace", replace)
-        with pytest.raises(OSError, match="no"):
+        with pytest.raises(RebodyError, match="cannot be written: no"):
             save_checkpoint(folder, state(2.0), META)
     assert tree_hash(load_checkpoint(folder, state())[0]) == tree_hash(state())
     assert [entry.name for entry in folder.iterdir()] == [checkpoint.FILE]
+
+
+def test_a_full_disk_is_one_message_and_leaves_the_old_one(folder, little_space):
+    large = state() | {"replay": np.zeros(100_000)}
+    with little_space(4096), pytest.raises(RebodyError, match=r"cannot be written: .*\. The one before is still there"):
+        save_checkpoint(folder, large, META)
+    assert tree_hash(load_checkpoint(folder, state())[0]) == tree_hash(state())
+    assert [entry.name for entry in folder.iterdir()] == [checkpoint.FILE]
+
+
+def test_a_pipe_is_refused_at_once(folder):
+    (folder / checkpoint.FILE).unlink()
+    os.mkfifo(folder / checkpoint.FILE)
+    with pytest.raises(RebodyError, match="is a pipe"):
+        load_checkpoint(folder, state())
 
 
 ENDLESS = """

@@ -136,16 +136,6 @@ def test_other_settings_are_not_resumed(pipeline, tmp_path, changes, named, caps
     assert pipeline.end(out) == before
 
 
-def test_a_run_killed_while_its_artifact_was_saved_is_found_again(pipelines, tmp_path, measured_in_short):
-    pipeline, out = pipelines["tracker"], tmp_path / "run"
-    assert pipeline(out) == 0
-    before = pipeline.end(out)
-    out.rename(tmp_path / ".run.old")
-    assert pipeline(out, "--resume") == 0
-    assert pipeline.end(out) == before
-    assert list(tmp_path.iterdir()) == [out]
-
-
 def untrained(pipeline):
     """What makes a run take no turn at all."""
     if pipeline.name != "inference":
@@ -199,6 +189,7 @@ def test_an_encoder_of_another_window_is_refused(pipelines, tmp_path, capsys):
 )
 def test_divergence_leaves_no_artifact(pipelines, tmp_path, name, rate, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)  # MuJoCo may leave a log of its warnings
+    monkeypatch.setattr(pipelines[name].train, "check_ranges", lambda config: None)
     assert pipelines[name](tmp_path / "run", rate) == 2
     said = capsys.readouterr().err
     assert "diverged" in said

@@ -82,10 +82,17 @@ class Agent(eqx.Module):
         """Take in the transition since the last decision; speak anew at every `stride`-th."""
         transition = Transition(carry.previous, observation.reward, observation.state)
         memory, belief = self.inferrer.step(carry.memory, transition)
-        fresh = self.command(observation.state, belief, carry.decisions)
+        return self._speak(carry, memory, belief, observation.state)
+
+    def pass_over(self, carry: Carry, state: GlobalState) -> tuple[Carry, Command]:
+        """A decision before which no reward was heard: memory and belief stay as they are, time goes on."""
+        return self._speak(carry, carry.memory, carry.belief, state)
+
+    def _speak(self, carry: Carry, memory: Any, belief: Belief, state: GlobalState) -> tuple[Carry, Command]:
+        fresh = self.command(state, belief, carry.decisions)
         speaks = carry.decisions % self.stride == 0
         command = jax.tree.map(lambda new, held: jnp.where(speaks, new, held), fresh, carry.command)
-        return Carry(memory, belief, observation.state, command, carry.decisions + 1), command
+        return Carry(memory, belief, state, command, carry.decisions + 1), command
 
     @abstractmethod
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:

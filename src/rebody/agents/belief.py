@@ -1,9 +1,8 @@
 """A frozen module's belief about one task, told of it from outside: state and reward in, reading out."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, SupportsFloat
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -11,11 +10,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from rebody import inputs
+from rebody.agents.doubts import RECENT_S, RewardWatch
 from rebody.bodies.robot import wrap_angle
 from rebody.errors import RebodyError
 from rebody.inference import Encoder, EncoderCarry
+from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import MixturePrior
 from rebody.inference.probe import Probe
+from rebody.jax_settings import own_jax_settings
 from rebody.tasks import FAMILIES
 from rebody.types import DECISION_DT, GLOBAL_FIELDS, RATE_OF, AnyArray, Belief, GlobalState, Transition
 
@@ -45,9 +48,19 @@ class Reading:
 class LiveBelief:
     """Takes in a decision at a time; `rebody.load_inference(name).begin(state)` makes one."""
 
-    def __init__(self, encoder: Encoder, probe: Probe, mixture: MixturePrior | None, state: Mapping[str, Any]):
+    def __init__(
+        self,
+        encoder: Encoder,
+        probe: Probe,
+        mixture: MixturePrior | None,
+        contract: Contract,
+        state: Any,
+    ):
         self._encoder, self._probe, self._mixture = encoder, probe, mixture
-        self._memory, self._previous = encoder.initial(), _global_state(encoder.fields, state, None)
+        self.believed = 0
+        """Decisions in which a reward was heard and believed."""
+        self._decision, self._watch = 0, RewardWatch(contract)
+        self._memory, self._previous = encoder.initial(), _global_state(encoder.fields, state, None, "at the start")
         self._reading = self._read(encoder.prior())
 
     @property
@@ -55,21 +68,36 @@ class LiveBelief:
         """What is believed now; before the first update that of a belief that knows nothing."""
         return self._reading
 
-    def update(self, state: Mapping[str, Any], reward: SupportsFloat) -> Reading:
+    @own_jax_settings()
+    def update(self, state: Any, reward: Any) -> Reading:
         """Take in a decision: the state 0.1 s after the last one, and the reward in between; what is believed now.
 
-        `state` holds the fields that the module sees (m, rad, m/s, rad/s; others are not looked at). A velocity that
-        is left out is the displacement over the decision. RebodyError where a field is missing or no finite number,
-        or the reward is one that no task gives: rewards are never positive.
+        `state` is a mapping with the fields that the module sees (m, rad, m/s, rad/s; others are not looked at). A
+        velocity that is left out is the displacement over the decision. A `reward` of None means that nothing was
+        heard; then, and where no task could have paid it (see `doubts`), the belief stays as it is. RebodyError, and
+        nothing is taken in, where a field is missing, or a number is not finite or beyond `rebody.inputs.LARGEST`.
         """
-        heard = float(reward)
-        if not math.isfinite(heard) or heard > 0:
-            raise RebodyError(f"the reward {heard:g} cannot be: it is -|error|, never above 0.")
-        now = _global_state(self._encoder.fields, state, self._previous)
-        transition = Transition(self._previous, np.asarray(heard, np.float32), now)
-        self._memory, belief = _take_in(self._encoder, self._memory, transition)
-        self._previous, self._reading = now, self._read(belief)
+        where = f"decision {self._decision + 1}"
+        heard = inputs.reward(reward, where)
+        now = _global_state(self._encoder.fields, state, self._previous, where)
+        self._decision += 1
+        if heard is None:
+            self._watch.pass_over()
+        elif self._watch.hear(self._previous, now, heard):
+            transition = Transition(self._previous, np.asarray(heard, np.float32), now)
+            self._memory, belief = _take_in(self._encoder, self._memory, transition)
+            self._reading = self._read(belief)
+            self.believed += 1
+        self._previous = now
         return self._reading
+
+    def doubts(self, within_s: float = RECENT_S) -> tuple[str, ...]:
+        """Sentences about rewards of the last seconds that no task could have paid, and that were not believed."""
+        return self._watch.doubts(within_s)
+
+    def notes(self, within_s: float = RECENT_S) -> tuple[str, ...]:
+        """Sentences about rewards of the last seconds that no task in the module's ranges would have paid."""
+        return self._watch.notes(within_s)
 
     def _read(self, belief: Belief) -> Reading:
         read = jax.tree.map(np.asarray, _read(self._probe, self._mixture, belief))
@@ -89,24 +117,30 @@ class LiveBelief:
         )
 
 
-def _global_state(fields: tuple[str, ...], given: Mapping[str, Any], previous: GlobalState | None) -> GlobalState:
+def _global_state(fields: tuple[str, ...], given: Any, previous: GlobalState | None, where: str) -> GlobalState:
     """What an encoder that sees these fields is shown."""
-    known = {field: float(given[field]) for field in GLOBAL_FIELDS if field in given}
+    if not isinstance(given, Mapping):
+        raise RebodyError(f"{where}: the state is of type {type(given).__name__}; give a mapping such as {{'x': 0.0}}.")
+    there = {field for field in GLOBAL_FIELDS if given.get(field) is not None}
+    displaced = {RATE_OF[field] for field in fields if field in RATE_OF and field not in there}
+    known = {
+        field: inputs.number(given[field], f"the state's '{field}'", where)
+        for field in sorted(there & {*fields, *displaced})
+    }
     for field in fields:
         if field not in known:
-            known[field] = _velocity(field, known, previous)
-    if faulty := [field for field in fields if not math.isfinite(known[field])]:
-        raise RebodyError(f"the state's '{faulty[0]}' is {known[faulty[0]]}; give a finite number.")
+            known[field] = _velocity(field, known, previous, where)
     if "pitch" in known:
         known["pitch"] = _wrapped(known["pitch"])
     return GlobalState(**{field: np.asarray(known.get(field, 0.0), np.float32) for field in GLOBAL_FIELDS})
 
 
-def _velocity(field: str, known: Mapping[str, float], previous: GlobalState | None) -> float:
+def _velocity(field: str, known: Mapping[str, float], previous: GlobalState | None, where: str) -> float:
     """The displacement since the last decision over its time; nothing moved before the first."""
     position = RATE_OF.get(field)
     if position is None or position not in known:
-        raise RebodyError(f"the state lacks '{field}': give {field}" + (f", or {position}." if position else "."))
+        or_position = f", or {position}" if position else ""
+        raise RebodyError(f"{where}: the state lacks '{field}': give {field}{or_position}.")
     if previous is None:
         return 0.0
     moved = known[position] - float(getattr(previous, position))

@@ -21,23 +21,13 @@ from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import SLOTS
 from rebody.errors import RebodyError
 from rebody.inference.exact import exact_posterior, read_mode
+from rebody.names import AGENTS
 from rebody.store import tree_hash
 from rebody.tasks import FAMILIES
 from rebody.types import Task
 
 HORIZON = 15
 """Decisions that `reuse` looks ahead; 1 is the thesis."""
-AGENTS = {
-    "reuse": "the frozen module and the frozen policy of the toy",
-    "retrain": "the frozen module, and a high-level policy that was learned on the robot",
-    "readout": "the target read linearly from the module's belief, handed to the tracker",
-    "bayes": "the exact posterior in place of the module, its most probable target handed to the tracker",
-    "oracle": "told the task",
-    "flat": "the frozen module, and a policy without hierarchy that was learned on the robot",
-    "scratch": "module and policy that were learned on the robot together, nothing reused",
-    "idle": "knows nothing and stands still",
-}
-"""Every kind of agent, and what it is."""
 SlotsBy = Literal["classifier", "clusters"]
 """How `reuse` chooses a tracker's slot: by a classifier on the latent, or by the mixture's components."""
 

@@ -87,6 +87,12 @@ def decide(agent: Agent, carry: Carry, observation: Observation) -> tuple[Carry,
 
 
 @eqx.filter_jit
+def pass_over(agent: Agent, carry: Carry, state: GlobalState) -> tuple[Carry, Command]:
+    """`Agent.pass_over`, compiled."""
+    return agent.pass_over(carry, state)
+
+
+@eqx.filter_jit
 def _begin_each(agent: Agent, state: GlobalState) -> tuple[Carry, Command]:
     return jax.vmap(agent.begin)(state)
 

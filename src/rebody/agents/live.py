@@ -1,20 +1,47 @@
 """An agent for one robot, driven from outside: observation and reward in, joint action out."""
 
+from dataclasses import dataclass
+from typing import Any, Literal
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from rebody.agents.agent import Observation
+from rebody import inputs
+from rebody.agents.agent import Carry, Observation
 from rebody.agents.build import HORIZON, build_agent, check_robot_of, slot_chooser
-from rebody.agents.clock import begin, decide
+from rebody.agents.clock import begin, decide, pass_over
 from rebody.agents.controller import TrackerController
+from rebody.agents.doubts import RewardWatch
 from rebody.agents.parts import Inference, LoadedSlots, LoadedTracker, load_inference, load_slots_of, load_tracker
 from rebody.agents.rollout import joint_action
 from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
-from rebody.tasks import FAMILIES
+from rebody.jax_settings import own_jax_settings
+from rebody.tasks import FAMILIES, VELOCITY
 from rebody.types import Belief, Subgoal
+
+ON_BAD_INPUT = ("error", "hold")
+"""What becomes of numbers that cannot be: an error, or the last good ones for a while and then standing still."""
+HOLD_S = 0.3
+"""How long the last command is kept over bad input [s]; afterwards the tracker is told to stand still."""
+STATES_OF_A_TRANSITION = 3
+"""Good observations in a row, a decision apart, that a transition rests on: two states, each with its velocity."""
+
+
+@dataclass(frozen=True)
+class AgentStatus:
+    """How it stands with an agent."""
+
+    mode: Literal["running", "holding", "standing still"]
+    """`holding`: the last command is kept, since the input is bad; `standing still`: it has been for too long."""
+    bad_input: str | None
+    """What is wrong with the newest observation or reward, if anything is."""
+    doubts: tuple[str, ...]
+    """About rewards of the last 3.2 s that no task could have paid; they were not believed."""
+    notes: tuple[str, ...]
+    """About rewards of the last 3.2 s that no task in the module's ranges would have paid."""
 
 
 class LiveAgent:
@@ -27,11 +54,14 @@ class LiveAgent:
         tracker: LoadedTracker,
         slots: LoadedSlots | None = None,
         horizon: int = HORIZON,
+        on_bad_input: str = "error",
     ):
-        """RebodyError if the module or the tracker does not fit the robot."""
+        """RebodyError if the module or the tracker does not fit the robot, or `on_bad_input` is none of the two."""
+        if on_bad_input not in ON_BAD_INPUT:
+            raise RebodyError(f"on_bad_input is {on_bad_input!r}; choose one of {', '.join(ON_BAD_INPUT)}.")
         check_robot_of(tracker, spec)
         inference.contract.check_body(spec.name, spec.moving_fields, tracker.tracker.slots)
-        self._spec, self._inference = spec, inference
+        self._spec, self._inference, self._on_bad_input = spec, inference, on_bad_input
         self._controller = TrackerController(tracker.tracker, spec.goal_ahead)
         self._agent = build_agent(
             "reuse", inference, slots=slot_chooser(inference, slots, "classifier"), horizon=horizon
@@ -40,69 +70,134 @@ class LiveAgent:
 
     def reset(self) -> None:
         """Forget everything: a new episode begins with the next step."""
-        self._steps, self._pace = 0, np.zeros(())
+        self._steps, self._bad_steps, self._pace = 0, 0, np.zeros(())
+        self._bad_input: str | None = None
+        self._last_x: Float[np.ndarray, ""] | None = None
+        self._carry: Carry | None = None
+        self._watch = RewardWatch(self._inference.contract)
 
-    def step(self, observation: Float[np.ndarray, " observation"], reward: float) -> Float[np.ndarray, " action"]:
+    @own_jax_settings()
+    def step(self, observation: Any, reward: Any) -> Float[np.ndarray, " action"]:
         """Joint action in [-1, 1] for one control step.
 
-        `observation` is qpos with x, then qvel; `reward` is the task's, of the step that led here (ignored at
-        the first). Every 0.1 s the agent takes in a transition and decides anew.
+        `observation` is qpos with x, then qvel, in one array; `reward` is the task's, of the step that led here
+        (ignored at the first), None where nothing was heard. Every 0.1 s the agent takes in a transition and decides
+        anew. RebodyError for numbers that are not finite, beyond `rebody.inputs.LARGEST` or of another shape; with
+        `on_bad_input="hold"` only at the first step, afterwards `status` says so.
         """
-        model = self._spec.model
-        if np.shape(observation) != (model.nq + model.nv,):
-            raise RebodyError(
-                f"'{self._spec.name}' observes {model.nq + model.nv} numbers (qpos with x, then qvel), "
-                f"got shape {np.shape(observation)}."
-            )
-        qpos, qvel = np.split(np.asarray(observation, float), [model.nq])
+        observation, heard, is_whole = self._admit(observation, reward)
+        qpos, qvel = np.split(observation, [self._spec.model.nq])
         x = np.asarray(qpos[self._spec.root_addresses[0]])
-        if self._steps:
+        if self._last_x is not None and is_whole:
             self._pace = self._spec.next_pace(self._pace, np.asarray(x - self._last_x))
         if self._steps % self._spec.steps_per_decision == 0:
-            self._decide(qpos, reward)
-        self._steps, self._last_x = self._steps + 1, x
+            self._decide(qpos, heard, is_whole)
+        self._steps, self._last_x, self._observation = self._steps + 1, x if is_whole else None, observation
         pitch, joints = self._spec.pitch(qpos), self._spec.tracker_state(qpos, qvel, self._pace)
         x, pitch = np.asarray(x, np.float32), np.asarray(pitch, np.float32)
-        return np.asarray(joint_action(self._controller, joints, x, pitch, self._command.subgoal, self._carry.belief))
+        return np.asarray(joint_action(self._controller, joints, x, pitch, self._told, self._heard.belief))
 
     @property
     def belief(self) -> Belief:
         """Mean and variance of the latent; shapes [latent]."""
-        return jax.tree.map(np.asarray, self._carry.belief)
+        return jax.tree.map(np.asarray, self._heard.belief)
 
     @property
+    @own_jax_settings()
     def inferred(self) -> tuple[str, float]:
         """Family and target [m, m/s] that a linear probe reads from the belief; the agent does not use it."""
-        family, target = self._inference.parts.probe(self._carry.belief)
+        family, target = self._inference.parts.probe(self._heard.belief)
         return FAMILIES[int(family)].name, float(target)
 
     @property
     def subgoal(self) -> Subgoal:
         """What the tracker is after: a goal is a point in the world."""
-        return jax.tree.map(np.asarray, self._command.subgoal)
+        return jax.tree.map(np.asarray, self._told)
 
-    def _decide(self, qpos: Float[np.ndarray, " nq"], reward: float) -> None:
-        if self._steps == 0:
-            self._carry, self._command = begin(self._agent, self._spec.observe(qpos, qpos))
-        else:
-            state = self._spec.observe(qpos, self._previous_qpos)
-            observation = Observation(state, jnp.asarray(reward, jnp.float32))
-            self._carry, self._command = decide(self._agent, self._carry, observation)
+    @property
+    def status(self) -> AgentStatus:
+        """Whether the input is good, and whether the rewards can be believed."""
+        mode = "running" if not self._bad_steps else "standing still" if self._stands_still else "holding"
+        return AgentStatus(mode, self._bad_input, self._watch.doubts(), self._watch.notes())
+
+    @property
+    def _heard(self) -> Carry:
+        if self._carry is None:
+            raise RebodyError("the agent has not seen anything yet: call step first.")
+        return self._carry
+
+    @property
+    def _told(self) -> Subgoal:
+        """The subgoal that the tracker follows now."""
+        subgoal = self._heard.command.subgoal
+        if not self._stands_still:
+            return subgoal
+        return Subgoal(jnp.full_like(subgoal.slot, VELOCITY), jnp.zeros_like(subgoal.value))
+
+    @property
+    def _stands_still(self) -> bool:
+        return self._bad_steps > round(HOLD_S / self._spec.control_dt)
+
+    def _admit(self, observation: Any, reward: Any) -> tuple[Float[np.ndarray, " observation"], float | None, bool]:
+        """What can be used of observation and reward, and whether the observation is whole."""
+        model = self._spec.model
+        where = f"decision {self._steps // self._spec.steps_per_decision}"
+        what, shape = f"the observation of '{self._spec.name}' (qpos with x, then qvel)", (model.nq + model.nv,)
+        self._bad_input, is_whole, heard = None, True, None
+        try:
+            heard = inputs.reward(reward, where)
+            usable = inputs.numbers(observation, shape, what, where)
+        except RebodyError as error:
+            if self._on_bad_input == "error" or self._carry is None:
+                raise
+            self._bad_input = str(error)
+            bad = inputs.bad_entries(observation, shape)
+            is_whole, usable = not bad.any(), self._observation.copy()
+            usable[~bad] = np.asarray(observation, float)[~bad] if not bad.all() else []
+            heard = heard if is_whole else None
+        self._bad_steps = self._bad_steps + 1 if self._bad_input else 0
+        return usable, heard, is_whole
+
+    def _decide(self, qpos: Float[np.ndarray, " nq"], reward: float | None, is_whole: bool) -> None:
+        """At a decision: a state that is not whole has no velocity, nor has the one after it."""
+        if self._carry is None:
+            self._carry, _ = begin(self._agent, self._spec.observe(qpos, qpos))
+            self._previous_qpos, self._good_decisions = qpos, STATES_OF_A_TRANSITION
+            return
+        self._good_decisions = self._good_decisions + 1 if is_whole else 0
+        if self._good_decisions >= STATES_OF_A_TRANSITION - 1:
+            self._take_in(qpos, reward if self._good_decisions >= STATES_OF_A_TRANSITION else None)
         self._previous_qpos = qpos
 
+    def _take_in(self, qpos: Float[np.ndarray, " nq"], reward: float | None) -> None:
+        assert self._carry is not None
+        state = self._spec.observe(qpos, self._previous_qpos)
+        if reward is not None and self._watch.hear(self._carry.previous, state, reward):
+            observation = Observation(state, jnp.asarray(reward, jnp.float32))
+            self._carry, _ = decide(self._agent, self._carry, observation)
+            return
+        if reward is None:
+            self._watch.pass_over()
+        self._carry, _ = pass_over(self._agent, self._carry, state)
 
+
+@own_jax_settings()
 def load_agent(
     robot: str = "cheetah",
     inference: str = "goal-velocity",
     tracker: str | None = None,
     classifier: str | None = None,
     horizon: int = HORIZON,
+    on_bad_input: str = "error",
 ) -> LiveAgent:
     """An agent of shipped or own artifacts, ready to `step`; RebodyError if they do not fit together.
 
     `robot` is a name or the path of a TOML file; tracker and classifier default to `tracker-ROBOT` and
-    `classifier-INFERENCE`, which a module of one family does not need.
+    `classifier-INFERENCE`, which a module of one family does not need. With `on_bad_input="hold"` a sensor that drops
+    out raises nothing: numbers that cannot be are replaced by the last good ones, the last command is kept for at most
+    0.3 s, and then the robot is told to stand still until the input is good again; `status` says so.
     """
     spec, module = load_robot(robot), load_inference(inference)
     slots = load_slots_of(module, classifier)
-    return LiveAgent(spec, module, load_tracker(tracker or f"tracker-{spec.name}"), slots, horizon)
+    tracked = load_tracker(tracker or f"tracker-{spec.name}")
+    return LiveAgent(spec, module, tracked, slots, horizon, on_bad_input)

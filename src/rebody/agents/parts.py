@@ -26,6 +26,7 @@ from rebody.inference import InferenceConfig, InferenceModule
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import MixturePrior, no_mixture
 from rebody.inference.probe import Probe
+from rebody.jax_settings import own_jax_settings
 from rebody.nn import MLP
 from rebody.store import Artifact, arrays_into_tree, load_artifact
 from rebody.tasks import family_index
@@ -56,14 +57,16 @@ class Inference:
         """How a task is put to the policy that is told it."""
         return task_code(self.contract.target_ranges)
 
-    def begin(self, state: Mapping[str, Any]) -> LiveBelief:
+    @own_jax_settings()
+    def begin(self, state: Any) -> LiveBelief:
         """The belief about a task that begins in this state: its `update` takes in every decision of 0.1 s.
 
-        `state` holds the fields of the contract (m, rad, m/s, rad/s) as `LiveBelief.update` has them. RebodyError if
-        the module hears of a body at other times, or a field is missing.
+        `state` is a mapping with the fields of the contract (m, rad, m/s, rad/s) as `LiveBelief.update` has them.
+        RebodyError if the module hears of a body at other times, or a field is missing.
         """
         self.contract.check_time()
-        return LiveBelief(self.parts.module.encoder, self.parts.probe, self.parts.mixture, state)
+        parts = self.parts
+        return LiveBelief(parts.module.encoder, parts.probe, parts.mixture, self.contract, state)
 
 
 @dataclass(frozen=True)
@@ -206,6 +209,7 @@ def slots_template(config: dict[str, Any]) -> SlotParts:
     return SlotParts(SlotClassifier(net, families), np.zeros(config["components"], np.int32))
 
 
+@own_jax_settings()
 def load_inference(reference: str) -> Inference:
     """A shipped inference artifact by name, or one in a folder; RebodyError if it cannot be read."""
     artifact = load_artifact(reference, "inference")

@@ -15,6 +15,9 @@ from jaxtyping import Float, UInt8
 
 from rebody.errors import RebodyError
 
+NOT_DRAWN = (RuntimeError, mujoco.FatalError, ImportError, AttributeError)
+"""What MuJoCo and PyOpenGL raise where OpenGL is switched off (MUJOCO_GL=off), missing, or has no display."""
+
 
 @dataclass(frozen=True)
 class Pole:
@@ -29,12 +32,12 @@ class Camera:
 
     def __init__(self, model: mujoco.MjModel, width: int = 640, height: int = 480):
         """Size in pixels, at most the model's offscreen buffer; RebodyError where nothing can be drawn."""
-        choose_opengl()
         model = _with_endless_floor(model)
         self._data = mujoco.MjData(model)
         try:
+            choose_opengl()
             self._renderer = mujoco.Renderer(model, height, width)
-        except (RuntimeError, mujoco.FatalError) as error:
+        except NOT_DRAWN as error:
             raise RebodyError(
                 "MuJoCo could not draw here. Set MUJOCO_GL to egl or osmesa (install libegl1 or libosmesa6), "
                 "or to glfw where there is a display."

@@ -10,8 +10,9 @@ import msgspec
 
 from rebody.bodies.robot import Fall, Reach, RobotSpec
 from rebody.errors import RebodyError
+from rebody.names import ROBOTS, shipped_robots
+from rebody.store.files import TEXT, read_file
 
-SHIPPED = Path(__file__).parent / "robots"
 GYMNASIUM_ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
 GYMNASIUM_PREFIX = "gymnasium:"
 
@@ -49,15 +50,10 @@ class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     goal_ahead: float = math.inf
 
 
-def shipped_robots() -> tuple[str, ...]:
-    """Names of the robots that come with the package."""
-    return tuple(sorted(path.stem for path in SHIPPED.glob("*.toml")))
-
-
 def load_robot(robot: str) -> RobotSpec:
     """A shipped robot by name, or one's own by the path of its TOML file; RebodyError if it cannot be had."""
     if robot in shipped_robots():
-        return _read(SHIPPED / f"{robot}.toml")
+        return _read(ROBOTS / f"{robot}.toml")
     if robot.endswith(".toml") or "/" in robot:
         return _read(Path(robot))
     near = difflib.get_close_matches(robot, shipped_robots(), n=1)
@@ -70,7 +66,7 @@ def load_robot(robot: str) -> RobotSpec:
 def _read(path: Path) -> RobotSpec:
     """RebodyError if the file is missing, is no TOML, or says something else than a robot's file should."""
     try:
-        description = msgspec.convert(tomllib.loads(path.read_text()), _Description)
+        description = msgspec.convert(tomllib.loads(read_file(path, TEXT).decode("utf-8-sig")), _Description)
     except OSError as error:
         raise RebodyError(f"cannot read the robot's file '{path}': {error.strerror}.") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from rebody.errors import RebodyError
+from rebody.ranges import Finite, Positive
 from rebody.types import DECISION_DT, GlobalState
 
 Floats = Float[np.ndarray, "..."]
@@ -51,13 +52,13 @@ class Fall:
 class Reach:
     """What may be asked of a robot's tracker."""
 
-    speed: tuple[float, float]
+    speed: tuple[Finite, Finite]
     """Fastest backward (negative) and forward [m/s]."""
-    distance: float = 5.0
+    distance: Positive = 5.0
     """Farthest goal [m]; farther ones are cut to it."""
-    pitch: tuple[float, float] | None = None
+    pitch: tuple[Finite, Finite] | None = None
     """Pitches that it can stand at [rad]; None for a robot that is not asked to."""
-    jump: tuple[float, float] | None = None
+    jump: tuple[Finite, Finite] | None = None
     """Vertical speeds that it can jump at [m/s]; None for a robot that is not asked to."""
 
     @property

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Float, PRNGKeyArray
 
 from rebody.errors import RebodyError
+from rebody.ranges import NotNegative, Positive
 from rebody.types import DECISION_DT, AnyArray, GlobalState
 
 
@@ -40,17 +41,17 @@ def no_disturbance(shape: tuple[int, ...]) -> Disturbance:
 class Randomisation:
     """Ranges from which each episode's disturbance is drawn uniformly."""
 
-    ripple_amplitude: float = 0.6
+    ripple_amplitude: NotNegative = 0.6
     """Largest amplitude of the ripple on the velocity [m/s]."""
-    ripple_period: tuple[float, float] = (0.2, 0.8)
+    ripple_period: tuple[Positive, Positive] = (0.2, 0.8)
     """Shortest and longest period of the ripple [s]."""
-    pitch_ripple: float = 1.0
+    pitch_ripple: NotNegative = 1.0
     """Largest amplitude of the ripple on the pitch rate, where a toy has pitch [rad/s]."""
-    lag: float = 0.5
+    lag: NotNegative = 0.5
     """Largest time constant of the force [s]."""
-    gain: tuple[float, float] = (0.5, 1.0)
+    gain: tuple[NotNegative, NotNegative] = (0.5, 1.0)
     """Smallest and largest share of the force that arrives."""
-    state_noise: float = 0.0
+    state_noise: NotNegative = 0.0
     """Variance of the noise added to position and velocity at every step (thesis 6.4-6.5)."""
 
     def sample(self, key: PRNGKeyArray, shape: tuple[int, ...]) -> Disturbance:

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rebody.bodies import shipped_robots
+from rebody.cli.output import check_output
 from rebody.cli.run import describe, shoot
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
@@ -40,8 +41,13 @@ class Demo:
             "now drives robots that it has never seen. Nobody tells it the task.\n",
             highlight=False,
         )
+        for path in (path for robot in robots_with_tracker() for path in self._files(robot)):
+            check_output(path, "--out")
         for robot in robots_with_tracker():
             self._show(TrialOptions(robot=robot).load(), console)
+
+    def _files(self, robot: str) -> list[Path]:
+        return [self.out / f"{robot}{ending}" for ending in (".json", ".png", ".mp4", "-episode.png")]
 
     def _show(self, trial: Trial, console: Console) -> None:
         specs = hidden_tasks(trial)
@@ -51,9 +57,7 @@ class Demo:
             )
         console.print(_table(reuse, oracle, idle))
         console.print(summary_table([reuse, oracle, idle]))
-        json, picture, video, figure = (
-            self.out / f"{trial.robot_name}{ending}" for ending in (".json", ".png", ".mp4", "-episode.png")
-        )
+        json, picture, video, figure = self._files(trial.robot_name)
         save_results(reuse, json)
         plot_transfer(reuse, oracle, idle, picture)
         written = [json, picture, figure]

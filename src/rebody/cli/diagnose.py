@@ -12,6 +12,7 @@ from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import save_results
 from rebody.evaluation.diagnosis import LADDER, diagnose, diagnosis_tables
+from rebody.ranges import Seeds
 from rebody.report.diagnosis import plot_diagnosis
 from rebody.tasks.task_file import read_tasks
 
@@ -22,7 +23,7 @@ class Diagnose:
 
     tasks: Path
     """Task file: [{"family": "goal", "target": -9.0}, ...]."""
-    seeds: int = 1
+    seeds: Seeds = 1
     """Every task once per evaluation seed 0 to N-1."""
     figure: Path | None = None
     """Where a PNG goes."""
@@ -32,13 +33,12 @@ class Diagnose:
 
     def run(self) -> None:
         """Evaluate all, print tables, draw."""
-        if self.seeds < 1:
-            raise RebodyError("--seeds must be at least 1.")
         if self.trial.agent != "reuse" or self.trial.thesis:
             raise RebodyError("a diagnosis is of `reuse` in its own time: leave --agent and --thesis out.")
-        check_output(self.figure, "--figure", PICTURES)
+        check_output(self.figure, "--figure", PICTURES, inputs=(self.tasks,))
         if self.out is not None:
-            check_output(self.out / "reuse.json", "--out")
+            for agent in LADDER:
+                check_output(self.out / f"{agent}.json", "--out", inputs=(self.tasks,))
         specs, trial, console = read_tasks(self.tasks), self.trial.load(), Console()
         with console.status("") as status:
             diagnosis = diagnose(trial, specs, self.seeds, lambda agent: status.update(_doing(agent)))

@@ -9,8 +9,8 @@ from rich.console import Console
 
 from rebody.cli.output import check_output
 from rebody.cli.trial import TrialOptions
-from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results, summary_table
+from rebody.ranges import Seeds
 from rebody.tasks.task_file import read_tasks
 
 
@@ -20,7 +20,7 @@ class Evaluate:
 
     tasks: Path
     """Task file: [{"family": "goal", "target": -9.0}, ...]."""
-    seeds: int = 1
+    seeds: Seeds = 1
     """Every task once per evaluation seed 0 to N-1."""
     json: Path | None = None
     """Where the JSON goes."""
@@ -28,9 +28,7 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate, save, print the table."""
-        if self.seeds < 1:
-            raise RebodyError("--seeds must be at least 1.")
-        check_output(self.json, "--json")
+        check_output(self.json, "--json", inputs=(self.tasks, self.trial.robot))
         specs = read_tasks(self.tasks)
         trial = self.trial.load()
         console = Console()

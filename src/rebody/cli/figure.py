@@ -6,6 +6,7 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
+from rebody.cli.output import check_output
 from rebody.report.thesis import find_figures, make_figure
 
 
@@ -23,7 +24,10 @@ class Figures:
     def run(self) -> None:
         """Draw each, say where."""
         console = Console(soft_wrap=True)
-        for figure in find_figures(self.numbers):
+        figures = find_figures(self.numbers)
+        for figure in figures:
+            check_output(self.out / f"{figure.number}.png", "--out")
+        for figure in figures:
             with console.status(f"{figure.number}: {figure.title}"):
                 path = make_figure(figure, self.out, rerun=self.rerun)
             console.print(f"{path}: {figure.title}", markup=False, highlight=False)

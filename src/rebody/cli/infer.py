@@ -6,11 +6,22 @@ from typing import Annotated
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 
 from rebody.agents.parts import load_inference
 from rebody.cli.output import check_output
 from rebody.errors import RebodyError
-from rebody.evaluation.logs import believe, doubts, read_log, resample, save_beliefs
+from rebody.evaluation.logs import (
+    Delimiter,
+    Format,
+    TimeUnit,
+    begun_at_zero,
+    believe,
+    doubts,
+    read_log,
+    resample,
+    save_beliefs,
+)
 from rebody.report import plot_beliefs
 
 TABLE, PICTURE = "belief.csv", "belief.png"
@@ -26,24 +37,40 @@ class Infer:
     """Inference artifact: a shipped name or a folder."""
     out: Path | None = None
     """Folder for belief.csv and belief.png."""
+    skip_bad_rows: bool = False
+    """Leave out rows with NaN, unreadable or too large numbers, missing cells, or time stamps that do not ascend, hear
+    nothing in gaps of more than 0.3 s, and say how many there were."""
+    delimiter: Delimiter = "comma"
+    """What stands between two cells."""
+    decimal_comma: bool = False
+    """Read 0,5 as 0.5."""
+    time_unit: TimeUnit = "s"
+    """Unit of the column time_s."""
 
     def run(self) -> None:
         """Read, listen, write, say what is believed at the end."""
-        if self.out is not None:
-            check_output(self.out / TABLE, "--out")
-            if (self.out / TABLE).resolve() == self.log.resolve():
-                raise RebodyError(f"--out {self.out} would write over the log. Choose another folder.")
+        self._check_out()
         inference, console = load_inference(self.inference), Console(soft_wrap=True)
-        fields = inference.contract.fields
-        log = read_log(self.log, fields)
-        decisions = resample(log, fields)
-        if log.ignored:
-            console.print(f"not looked at: {', '.join(log.ignored)}", markup=False, highlight=False)
-        for doubt in doubts(log, decisions, inference.contract):
-            console.print(f"[bold yellow]doubtful:[/] {doubt}", highlight=False)
+        contract = inference.contract
+        form = Format(self.delimiter, self.decimal_comma, self.time_unit)
+        log = begun_at_zero(read_log(self.log, contract.fields, form, self.skip_bad_rows), contract)
+        decisions = resample(log, contract.fields)
         with console.status(f"{len(decisions.reward)} decisions"):
             run = believe(inference, decisions)
+        for note in (*log.notes, *run.notes):
+            console.print(f"note: {note}", markup=False, highlight=False)
+        if log.ignored:
+            console.print(f"not looked at: {', '.join(log.ignored)}", markup=False, highlight=False)
+        for doubt in (*doubts(log, decisions, contract), *run.doubts):
+            console.print(f"[bold yellow]doubtful:[/] {escape(doubt)}", highlight=False)
         if self.out is not None:
             save_beliefs(run, self.out / TABLE)
             plot_beliefs(run, self.out / PICTURE)
         console.print(f"{inference.name} {run.conclusion()}", highlight=False)
+
+    def _check_out(self) -> None:
+        """RebodyError where the results cannot be written, or would take the log's place."""
+        for path in [self.out / name for name in (TABLE, PICTURE)] if self.out is not None else []:
+            check_output(path, "--out")
+            if path.exists() and self.log.exists() and path.samefile(self.log):  # by a link, too
+                raise RebodyError(f"--out {self.out} would write over the log. Choose another folder.")

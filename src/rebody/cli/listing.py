@@ -5,13 +5,10 @@ from dataclasses import dataclass
 from rich.console import Console
 from rich.table import Table
 
-from rebody.agents.build import AGENTS
-from rebody.bodies import shipped_robots
-from rebody.evaluation.evaluate import POINT_MASS
-from rebody.report.thesis import FIGURES
-from rebody.store import load_artifact, shipped_artifacts
-from rebody.tasks import FAMILIES
-from rebody.training.inference import PRESETS
+from rebody import names
+
+WHOLE_LINES = 1000
+"""Columns of what is no terminal: no line is longer."""
 
 
 @dataclass(frozen=True)
@@ -21,17 +18,22 @@ class List:
     def run(self) -> None:
         """Print them."""
         table = Table(show_header=False, box=None, padding=(0, 2))
-        for name in (POINT_MASS, *shipped_robots()):
-            table.add_row("body", name, "the toy" if name == POINT_MASS else "MuJoCo robot")
-        for family in FAMILIES:
-            table.add_row("family", family.name, f"{family.unit}, solved within {family.tolerance:g}")
-        for name, what in AGENTS.items():
-            table.add_row("agent", name, what)
-        for name, preset in PRESETS.items():
-            table.add_row("preset", name, (preset.__doc__ or "").splitlines()[0])
-        for name, kind in shipped_artifacts():
-            title = load_artifact(name, kind).card.splitlines()[0].lstrip("# ")
-            table.add_row("artifact", name, title)
-        for number, figure in FIGURES.items():
-            table.add_row("figure", number, figure.title)
-        Console().print(table)
+        for _ in range(3):
+            table.add_column(overflow="fold")  # a name that is cut is no name
+        table.add_row("body", names.POINT_MASS, "the toy")
+        for robot in names.shipped_robots():
+            table.add_row("body", robot, "MuJoCo robot")
+        tables = {
+            "family": names.FAMILIES,
+            "agent": names.AGENTS,
+            "preset": names.PRESETS,
+            "artifact": names.artifact_titles(),
+            "figure": names.FIGURES,
+        }
+        for kind, lines in tables.items():
+            for name, line in lines.items():
+                table.add_row(kind, name, line)
+        console = Console()
+        if not console.is_terminal:
+            console.width = WHOLE_LINES
+        console.print(table)

@@ -25,7 +25,7 @@ class Report:
         """Read all, write the page, say where it is."""
         if not self.runs:
             raise RebodyError(f"there is nothing to report. {EXPECTED}")
-        check_output(self.out, "--out", (".html",))
+        check_output(self.out, "--out", (".html",), inputs=self.runs)
         console = Console(soft_wrap=True)
         with console.status("reading"):
             found = [find(reference) for reference in self.runs]

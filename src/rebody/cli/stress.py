@@ -7,8 +7,8 @@ from rich.console import Console
 from rebody.agents.build import check_robot_of
 from rebody.agents.parts import load_tracker
 from rebody.bodies import load_robot
-from rebody.errors import RebodyError
 from rebody.evaluation.stress import CHANGE_S, PUSH, PUSH_S, SECONDS, stress
+from rebody.ranges import Episodes, Seed
 
 
 @dataclass(frozen=True)
@@ -19,15 +19,13 @@ class Stress:
     """A robot's name (see `rebody list`), or the path of its TOML file."""
     tracker: str | None = None
     """Tracker artifact; default tracker-ROBOT."""
-    episodes: int = 1000
+    episodes: Episodes = 1000
     """How many times."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of subgoals and pushes."""
 
     def run(self) -> None:
         """Run them all at once, print what share fell."""
-        if self.episodes < 1:
-            raise RebodyError("--episodes must be at least 1.")
         spec = load_robot(self.robot)
         loaded = load_tracker(self.tracker or f"tracker-{spec.name}")
         check_robot_of(loaded, spec)

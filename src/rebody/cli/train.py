@@ -9,6 +9,7 @@ from rich.console import Console
 
 from rebody.bodies import load_robot
 from rebody.errors import RebodyError
+from rebody.ranges import Seed
 from rebody.training.classifier import ClassifierConfig, train_classifier
 from rebody.training.flat import FlatConfig, train_flat
 from rebody.training.high_level import HighLevelConfig, train_high_level
@@ -30,10 +31,12 @@ class TrainInference:
     """Folder of the run, and of the artifact that it becomes."""
     preset: str = "position"
     """Settings to start from (see `rebody list`); any of them can be changed below."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of everything that is random."""
     resume: bool = False
-    """Go on with the run in --out."""
+    """Go on with the run in --out; what is still to come of its iterations may change."""
+    finish: bool = False
+    """With --resume: end the run as it stands, and make an artifact of what was done."""
     init_from: str | None = None
     """Start from the networks of this inference artifact."""
 
@@ -41,8 +44,9 @@ class TrainInference:
         """Train, save, say where."""
         title = f"Inference: {self.preset}"
         folder = train_inference(
-            self.config, self.out, self.seed, title=title, resume=self.resume, init_from=self.init_from
-        )
+            self.config, self.out, self.seed, title=title,
+            resume=self.resume, finish=self.finish, init_from=self.init_from,
+        )  # fmt: skip
         _show_card(folder)
 
 
@@ -55,18 +59,21 @@ class TrainTracker:
     """Folder of the run, and of the artifact that it becomes."""
     robot: str = tyro.MISSING
     """A robot's name (see `rebody list`), or the path of its TOML file."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of everything that is random."""
     resume: bool = False
-    """Go on with the run in --out."""
+    """Go on with the run in --out; what is still to come of its iterations may change."""
+    finish: bool = False
+    """With --resume: end the run as it stands, and make an artifact of what was done."""
     init_from: str | None = None
     """Start from the network of this tracker artifact."""
 
     def run(self) -> None:
         """Train, save, say where."""
         folder = train_tracker(
-            self.robot, self.config, self.out, self.seed, resume=self.resume, init_from=self.init_from
-        )
+            self.robot, self.config, self.out, self.seed,
+            resume=self.resume, finish=self.finish, init_from=self.init_from,
+        )  # fmt: skip
         _show_card(folder)
 
 
@@ -80,10 +87,12 @@ class TrainFlat:
     """Folder of the run, and of the artifact that it becomes."""
     inference: str = "position"
     """Inference artifact: a shipped name or a folder."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of everything that is random."""
     resume: bool = False
-    """Go on with the run in --out."""
+    """Go on with the run in --out; what is still to come of its iterations may change."""
+    finish: bool = False
+    """With --resume: end the run as it stands, and make an artifact of what was done."""
     init_from: str | None = None
     """Start from the network of this flat artifact."""
     config: Annotated[FlatConfig, tyro.conf.arg(name="")] = field(default_factory=FlatConfig)
@@ -91,8 +100,9 @@ class TrainFlat:
     def run(self) -> None:
         """Train, save, say where."""
         folder = train_flat(
-            self.robot, self.inference, self.config, self.out, self.seed, resume=self.resume, init_from=self.init_from
-        )
+            self.robot, self.inference, self.config, self.out, self.seed,
+            resume=self.resume, finish=self.finish, init_from=self.init_from,
+        )  # fmt: skip
         _show_card(folder)
 
 
@@ -104,10 +114,12 @@ class TrainScratch:
     """A robot's name (see `rebody list`), or the path of its TOML file."""
     out: Path
     """Folder of the run, and of the artifact that it becomes."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of everything that is random."""
     resume: bool = False
-    """Go on with the run in --out."""
+    """Go on with the run in --out; what is still to come of its iterations may change."""
+    finish: bool = False
+    """With --resume: end the run as it stands, and make an artifact of what was done."""
     init_from: str | None = None
     """Start from the networks of this scratch artifact."""
     config: Annotated[ScratchConfig, tyro.conf.arg(name="")] = field(default_factory=ScratchConfig)
@@ -115,8 +127,9 @@ class TrainScratch:
     def run(self) -> None:
         """Train, save, say where."""
         folder = train_scratch(
-            self.robot, self.config, self.out, self.seed, resume=self.resume, init_from=self.init_from
-        )
+            self.robot, self.config, self.out, self.seed,
+            resume=self.resume, finish=self.finish, init_from=self.init_from,
+        )  # fmt: skip
         _show_card(folder)
 
 
@@ -132,10 +145,12 @@ class TrainHighLevel:
     """Inference artifact: a shipped name or a folder."""
     tracker: str | None = None
     """Tracker artifact; default tracker-ROBOT."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of everything that is random."""
     resume: bool = False
-    """Go on with the run in --out."""
+    """Go on with the run in --out; what is still to come of its iterations may change."""
+    finish: bool = False
+    """With --resume: end the run as it stands, and make an artifact of what was done."""
     init_from: str | None = None
     """Start from the network of this high-level artifact."""
     config: Annotated[HighLevelConfig, tyro.conf.arg(name="")] = field(default_factory=HighLevelConfig)
@@ -144,7 +159,7 @@ class TrainHighLevel:
         """Train, save, say where."""
         folder = train_high_level(
             self.robot, self.inference, self.tracker, self.config, self.out, self.seed,
-            resume=self.resume, init_from=self.init_from,
+            resume=self.resume, finish=self.finish, init_from=self.init_from,
         )  # fmt: skip
         _show_card(folder)
 
@@ -159,10 +174,12 @@ class TrainStepPredictor:
     """Folder of the run, and of the artifact that it becomes."""
     tracker: str | None = None
     """Tracker artifact; default tracker-ROBOT."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of everything that is random."""
     resume: bool = False
-    """Go on with the run in --out."""
+    """Go on with the run in --out; what is still to come of its iterations may change."""
+    finish: bool = False
+    """With --resume: end the run as it stands, and make an artifact of what was done."""
     init_from: str | None = None
     """Start from the network of this step predictor."""
     config: Annotated[StepPredictorConfig, tyro.conf.arg(name="")] = field(default_factory=StepPredictorConfig)
@@ -170,8 +187,9 @@ class TrainStepPredictor:
     def run(self) -> None:
         """Train, save, say where."""
         folder = train_step_predictor(
-            self.robot, self.tracker, self.config, self.out, self.seed, resume=self.resume, init_from=self.init_from
-        )
+            self.robot, self.tracker, self.config, self.out, self.seed,
+            resume=self.resume, finish=self.finish, init_from=self.init_from,
+        )  # fmt: skip
         _show_card(folder)
 
 
@@ -183,15 +201,19 @@ class TrainClassifier:
     """Folder of the run, and of the artifact that it becomes."""
     inference: str = "goal-velocity"
     """Inference artifact: a shipped name or a folder."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of everything that is random."""
     resume: bool = False
-    """Go on with the run in --out."""
+    """Go on with the run in --out; what is still to come of its iterations may change."""
+    finish: bool = False
+    """With --resume: end the run as it stands, and make an artifact of what was done."""
     config: Annotated[ClassifierConfig, tyro.conf.arg(name="")] = field(default_factory=ClassifierConfig)
 
     def run(self) -> None:
         """Train, save, say where."""
-        _show_card(train_classifier(self.inference, self.config, self.out, self.seed, resume=self.resume))
+        _show_card(
+            train_classifier(self.inference, self.config, self.out, self.seed, resume=self.resume, finish=self.finish)
+        )
 
 
 def train_command(arguments: list[str]) -> type:

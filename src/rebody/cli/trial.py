@@ -24,6 +24,7 @@ from rebody.agents.parts import (
 from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import POINT_MASS, Trial
+from rebody.ranges import Count, Decisions, Seconds
 
 AGENT_HELP = "; ".join(f"{name}: {what}" for name, what in AGENTS.items())
 
@@ -49,14 +50,14 @@ class TrialOptions:
     """What chooses the slots of `reuse`; default classifier-INFERENCE where a module knows several families."""
     slots_by: SlotsBy = "classifier"
     """Choose them by the classifier, or by the mixture's clusters."""
-    seconds: float = 20.0
+    seconds: Seconds = 20.0
     """Length of an episode."""
-    stride: int | Literal["predicted"] = 1
+    stride: Count | Literal["predicted"] = 1
     """Decisions for which a subgoal is held; in thesis mode control steps from one decision to the next, a number or
     chosen anew each time by the step predictor (6.4.3)."""
     step_predictor: str | None = None
     """Step predictor of `--stride predicted`; default step-predictor-ROBOT."""
-    horizon: int | None = None
+    horizon: Decisions | None = None
     """Decisions that `reuse` looks ahead; default 15, in thesis mode 1."""
     thesis: bool = False
     """Thesis mode (6.3.3): the module hears of the world once per stride only."""

@@ -10,6 +10,7 @@ from rebody.bodies import shipped_robots
 from rebody.cli.trial import AGENT_HELP, TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import POINT_MASS, Trial, check_trial
+from rebody.ranges import Port
 from rebody.store import shipped_artifacts
 from rebody.tasks.task_file import parse_task
 
@@ -34,7 +35,7 @@ class View:
     """Flat policy of that robot and module; default flat-INFERENCE-ROBOT."""
     classifier: str | None = None
     """Classifier of that module; default classifier-INFERENCE."""
-    port: int = 8080
+    port: Port = 8080
     """Where on this machine the page is; 0 for any free port."""
 
     def run(self) -> None:

@@ -16,6 +16,7 @@ from jaxtyping import Float, Key, PRNGKeyArray
 
 from rebody.errors import RebodyError
 from rebody.nn import MLP, MultiScale
+from rebody.ranges import Copies, Finite, Number, Positive, Rate, Share, Updates
 from rebody.types import AnyArray, Tree
 
 LOG_STD_RANGE = (-5.0, 1.0)
@@ -25,29 +26,29 @@ LOG_STD_RANGE = (-5.0, 1.0)
 class SACConfig:
     """Hyperparameters of soft actor-critic."""
 
-    hidden: tuple[int, ...] = (256, 256)
+    hidden: tuple[Copies, ...] = (256, 256)
     """Units of each hidden layer of actor and critics."""
-    projections: int = 0
+    projections: Number = 0
     """Learned differences of the inputs that the networks see at several sharpnesses; 0 for none."""
-    learning_rate: float = 3e-4
+    learning_rate: Rate = 3e-4
     """Adam's step size for actor and critics at the start."""
-    final_learning_rate: float = 3e-5
+    final_learning_rate: Rate = 3e-5
     """Step size that a cosine reaches after `decay_updates`: small steps make precise policies."""
-    decay_updates: int = 100_000
+    decay_updates: Updates = 100_000
     """Updates over which the step size falls."""
-    discount: float = 0.98
+    discount: Share = 0.98
     """Discount per step."""
-    target_rate: float = 0.005
+    target_rate: Rate = 0.005
     """Share of the new critic in the target critic at each update (tau)."""
-    average_rate: float = 0.002
+    average_rate: Rate = 0.002
     """Share of the new actor in the averaged one."""
-    target_entropy: float = -1.0
+    target_entropy: Finite = -1.0
     """Wanted entropy [nats] per action dimension, of the action before its bounds are scaled."""
-    initial_temperature: float = 0.1
+    initial_temperature: Positive = 0.1
     """Temperature alpha at the start; learned from there."""
-    batch_size: int = 256
+    batch_size: Copies = 256
     """Transitions of one update."""
-    huber: float = 100.0
+    huber: Positive = 100.0
     """Bellman errors beyond this count linearly. Where a hidden task makes early values uncertain by metres,
     it keeps them from drowning the centimetres."""
 

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from rebody.bodies.robot import Reach
 from rebody.control.sac import Actor
+from rebody.ranges import NotNegative
 from rebody.tasks.families import GOAL, JUMP, STAND, family_index
 from rebody.types import AnyArray, Subgoal
 
@@ -44,25 +45,25 @@ class Motion(eqx.Module):
 class TrackerReward:
     """What a tracker is paid per control step."""
 
-    distance: float = 0.2
+    distance: NotNegative = 0.2
     """Per metre from the goal."""
-    arrival: float = 0.5
+    arrival: NotNegative = 0.5
     """Paid in full on a goal or pitch, half at 0.1 m or rad: pulls the last centimetres."""
-    speed: float = 0.4
+    speed: NotNegative = 0.4
     """Per m/s from the wanted speed."""
-    turn: float = 0.5
+    turn: NotNegative = 0.5
     """Per rad from the wanted pitch."""
-    overshoot: float = 4.0
+    overshoot: NotNegative = 4.0
     """Of a jump, which is paid by the square of its share of the wanted vertical speed: price of each share beyond.
     The square makes one high jump worth more than many low ones."""
-    relative: float = 0.0
+    relative: NotNegative = 0.0
     """Paid in full at the wanted speed, less by the error relative to it; a far goal is the speed that leads there.
     In place of `distance` and `speed` where a robot must learn to walk first."""
-    alive: float = 0.0
+    alive: NotNegative = 0.0
     """Paid as long as it has not fallen."""
-    upright: float = 0.5
+    upright: NotNegative = 0.5
     """Times 1 - cos(pitch), where no pitch is asked for: a robot must not end on its back."""
-    energy: float = 0.02
+    energy: NotNegative = 0.02
     """Times the mean squared action: a robot that has arrived stands still."""
 
 

@@ -8,15 +8,17 @@ import numpy as np
 from gymnasium import spaces
 from jaxtyping import Float
 
-from rebody.agents.belief import Reading
+from rebody import inputs
+from rebody.agents.belief import LiveBelief, Reading
 from rebody.agents.parts import load_inference
 from rebody.errors import RebodyError
 from rebody.types import DECISION_DT
 
 Observe = Callable[[Any, dict[str, Any]], Mapping[str, Any]]
 """(observation, info) -> the fields that the module sees, as `LiveBelief.update` has them."""
-TaskReward = Callable[[Any, float, dict[str, Any]], float]
-"""(observation, reward, info) -> the task's share of the reward: -|error|, without costs and bonuses."""
+TaskReward = Callable[[Any, float, dict[str, Any]], float | None]
+"""(observation, reward, info) -> the task's share of the reward: -|error|, without costs and bonuses; None where
+nothing was heard."""
 
 
 class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
@@ -39,6 +41,8 @@ class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
         made_of = {"inference": inference, "control_dt": control_dt, "observe": observe, "task_reward": task_reward}
         gymnasium.utils.RecordConstructorArgs.__init__(self, **made_of)
         gymnasium.Wrapper.__init__(self, env)
+        if not inputs.number(control_dt, "control_dt") > 0:
+            raise RebodyError(f"control_dt is {control_dt:g} s; a step of the environment lasts longer than 0.")
         self._per_decision = round(DECISION_DT / control_dt)
         if self._per_decision < 1 or not np.isclose(self._per_decision * control_dt, DECISION_DT):
             raise RebodyError(f"steps of {control_dt:g} s do not divide a decision of {DECISION_DT} s.")
@@ -46,26 +50,42 @@ class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
             raise RebodyError(f"observations must be a vector, not {env.observation_space}; flatten them first.")
         self._inference = load_inference(inference)
         self._observe, self._task_reward = observe, task_reward
+        self._belief: LiveBelief | None = None
         self.observation_space = _with_belief(env.observation_space, self._inference.parts.module.encoder.latent)
 
     @property
     def reading(self) -> Reading:
-        """What is believed now."""
-        return self._belief.reading
+        """What is believed now; RebodyError before the first reset."""
+        return self._heard.reading
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """About rewards of the last seconds that no task could have paid; they were not believed."""
+        return self._heard.doubts()
+
+    @property
+    def _heard(self) -> LiveBelief:
+        if self._belief is None:
+            raise RebodyError("nothing is believed before the first reset: call reset.")
+        return self._belief
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
         """Start anew and forget."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._belief = self._inference.begin(self._observe(observation, info))
-        self._rewards: list[float] = []
+        self._rewards: list[float | None] = []
         return self._beside(observation), info
 
     def step(self, action: Any):
-        """One step; the last of each decision changes the belief, which hears the mean reward."""
+        """One step; the last of each decision changes the belief, which hears the mean of the rewards that there are.
+
+        RebodyError for a reward or a state that is no finite number.
+        """
         observation, reward, terminated, truncated, info = self.env.step(action)
-        self._rewards.append(float(self._task_reward(observation, float(reward), info)))
+        self._rewards.append(inputs.reward(self._task_reward(observation, float(reward), info)))
         if len(self._rewards) == self._per_decision:
-            self._belief.update(self._observe(observation, info), float(np.mean(self._rewards)))
+            heard = [reward for reward in self._rewards if reward is not None]
+            self._heard.update(self._observe(observation, info), float(np.mean(heard)) if heard else None)
             self._rewards = []
         return self._beside(observation), reward, terminated, truncated, info
 

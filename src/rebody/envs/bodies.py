@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.toy_models import mass_damper_model
 from rebody.bodies.toys import MassDamper
+from rebody.jax_settings import own_jax_settings
 from rebody.types import GlobalState
 
 
@@ -79,6 +80,7 @@ class PointMasses(Bodies):
         """Put one point mass at rest at x = 0."""
         self._x[body] = self._vx[body] = 0.0
 
+    @own_jax_settings()
     def step(self, actions: Float[np.ndarray, "body 1"]) -> None:
         """One decision of every point mass."""
         x, vx = _advance(self._toy, self._x, self._vx, actions.astype(np.float32))

@@ -6,6 +6,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from rebody import inputs
 from rebody.envs.bodies import Bodies
 from rebody.envs.world import DEFAULT_BASE_TASKS, World
 from rebody.tasks import BaseTask
@@ -34,9 +35,9 @@ class TaskEnv(gymnasium.Env):
         self._world.reset(0, self.np_random, options)
         return self._world.observations()[0], self._info()
 
-    def step(self, action: np.ndarray):
-        """One step with an action in [-1, 1]; larger ones are clipped."""
-        self._world.bodies.step(np.asarray(action, np.float64)[None])
+    def step(self, action: Any):
+        """One step with an action in [-1, 1]; larger ones are clipped. RebodyError for NaN or another shape."""
+        self._world.bodies.step(inputs.numbers(action, self._world.action_space.shape, "the action")[None])
         reward = float(self._world.rewards()[0])
         return self._world.observations()[0], reward, False, False, self._info()
 

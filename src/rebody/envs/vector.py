@@ -9,6 +9,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from rebody import inputs
 from rebody.envs.bodies import Bodies
 from rebody.envs.world import DEFAULT_BASE_TASKS, World
 from rebody.tasks import BaseTask
@@ -55,10 +56,14 @@ class TaskVectorEnv(VectorEnv):
         self._ended[:] = False
         return self._world.observations(), self._info()
 
-    def step(self, actions: np.ndarray):
-        """One step of all; a body whose episode ended is reset instead, with a reward of 0 (NEXT_STEP)."""
+    def step(self, actions: Any):
+        """One step of all; a body whose episode ended is reset instead, with a reward of 0 (NEXT_STEP).
+
+        RebodyError, and none moves, for NaN or another shape.
+        """
+        actions = inputs.numbers(actions, (self.num_envs, self._world.bodies.actions), "the array of actions")
         started = self._ended
-        self._world.bodies.step(np.asarray(actions, np.float64))
+        self._world.bodies.step(actions)
         for body in np.flatnonzero(started):
             self._world.reset(int(body), self._rngs[body])
         self._steps = np.where(started, 0, self._steps + 1)

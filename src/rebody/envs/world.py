@@ -1,6 +1,5 @@
 """Bodies, each with a task that its observation does not show: what single and vector environments share."""
 
-import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, cast, get_args
@@ -10,9 +9,11 @@ import numpy as np
 from gymnasium import spaces
 from jaxtyping import Float
 
+from rebody import inputs
 from rebody.bodies.camera import Camera
 from rebody.envs.bodies import Bodies
 from rebody.errors import RebodyError
+from rebody.jax_settings import own_jax_settings
 from rebody.tasks import BaseTask, RewardForm, TaskDistribution, family_index, family_names, reward
 from rebody.types import GLOBAL_FIELDS, Task
 
@@ -32,11 +33,10 @@ class World:
         """RebodyError where there is no base task, an unknown family or an unknown form of the reward."""
         if not base_tasks:
             raise RebodyError("base_tasks is empty; give at least one BaseTask(family, low, high).")
-        distribution = TaskDistribution(tuple(base_tasks))
         self.bodies = bodies
-        self._families = np.full(bodies.size, distribution.families[0], np.int32)
+        self._tasks = TaskDistribution(tuple(base_tasks))
+        self._families = np.full(bodies.size, self._tasks.families[0], np.int32)
         self._targets = np.zeros(bodies.size)
-        self._sample = jax.jit(lambda seed: distribution.sample(jax.random.key(seed), ()))
         self._reward = jax.jit(partial(reward, form=_form(reward_form)))
         self._camera: Camera | None = None
 
@@ -53,7 +53,7 @@ class World:
 
     def reset(self, body: int, rng: np.random.Generator, options: Mapping[str, Any] | None = None) -> None:
         """Put one body at its start and give it the task of the options, else a drawn one."""
-        task = task_of_options(options) if options else self._sample(rng.integers(2**32, dtype=np.uint32))
+        task = task_of_options(options) if options else self._tasks.draw(rng)
         self._families[body], self._targets[body] = task.family, task.target
         self.bodies.reset(body, rng)
 
@@ -61,6 +61,7 @@ class World:
         """qpos with x, then qvel."""
         return np.concatenate([self.bodies.qpos, self.bodies.qvel], axis=-1)
 
+    @own_jax_settings()
     def rewards(self) -> Float[np.ndarray, " body"]:
         """The tasks' rewards of the last step."""
         task = Task(self._families, self._targets)
@@ -92,7 +93,7 @@ def task_of_options(options: Mapping[str, Any]) -> Task:
             'as in options={"family": "goal", "target": -3.0}, or no options to have a task drawn.'
         )
     family = family_index(str(options["family"]))
-    return Task(np.asarray(family), np.asarray(_finite(options["target"])))
+    return Task(np.asarray(family), np.asarray(inputs.number(options["target"], "the target")))
 
 
 def _form(name: str) -> RewardForm:
@@ -100,13 +101,3 @@ def _form(name: str) -> RewardForm:
     if name not in known:
         raise RebodyError(f"unknown reward '{name}'; choose one of {', '.join(known)}.")
     return cast(RewardForm, name)
-
-
-def _finite(target: Any) -> float:
-    try:
-        number = float(target)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise RebodyError(f"the target {target!r} is no finite number; give one in m or m/s, as in -3.0.")
-    return number

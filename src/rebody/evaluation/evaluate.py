@@ -36,6 +36,7 @@ from rebody.control.tracker import slots_of
 from rebody.errors import RebodyError
 from rebody.evaluation.results import Results, episode_results
 from rebody.inference.contract import Contract
+from rebody.jax_settings import own_jax_settings
 from rebody.store import tree_hash
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, Task
@@ -43,6 +44,9 @@ from rebody.types import DECISION_DT, Task
 POINT_MASS = "point-mass"
 THESIS_AGENTS = ("reuse", "retrain", "readout", "bayes")
 ROBOT_AGENTS = ("retrain", "flat", "scratch")
+MOST_DECISIONS = 1_000_000
+"""Of all episodes of an evaluation together, 5,000 of 20 s: they are held in memory, and the slowest robot takes half
+an hour for them."""
 
 
 @dataclass(frozen=True)
@@ -97,12 +101,14 @@ class Trial:
         return round(self.seconds / DECISION_DT)
 
 
+@own_jax_settings()
 def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
     """Judge an agent on every task, once per evaluation seed 0 to `seeds` - 1.
 
-    RebodyError where module, policies, tasks and robot do not fit together.
+    RebodyError where module, policies, tasks and robot do not fit together, or there is too much to do at once.
     """
     check_trial(trial, specs)
+    _check_size(trial, len(specs) * seeds)
     specs = [spec for spec in specs for _ in range(seeds)]
     episode_seeds = np.tile(np.arange(seeds), len(specs) // seeds)
     tasks = active_tasks(specs, trial.decisions, DECISION_DT)
@@ -225,6 +231,15 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
     if trial.step_predictor is not None:
         assert trial.tracker is not None
         check_step_predictor(trial.step_predictor, trial.tracker, trial.inference)
+
+
+def _check_size(trial: Trial, episodes: int) -> None:
+    most = MOST_DECISIONS // trial.decisions
+    if not 1 <= episodes <= most:
+        raise RebodyError(
+            f"{episodes:,} episodes of {trial.seconds:g} s cannot be evaluated at once: at most {most:,}, at least 1. "
+            "Take fewer seeds, or split the task file."
+        )
 
 
 def _check_tasks(trial: Trial, specs: list[TaskSpec]) -> None:

@@ -7,14 +7,15 @@ import msgspec
 
 from rebody.errors import RebodyError
 from rebody.evaluation.results import VERSION, EpisodeResult, Results
+from rebody.store.files import DATA, read_file
 from rebody.tasks import family_index
 
 WANTED = "such a file is written by `rebody evaluate --json`"
 
 
-def read_results(path: Path) -> Results:
-    """What `save_results` wrote; RebodyError that says what is wrong with another file."""
-    content = _content(path)
+def read_results(path: Path, inside: Path | None = None) -> Results:
+    """What `save_results` wrote, not outside the folder `inside`; RebodyError that says what is wrong with a file."""
+    content = _content(path, read_file(path, DATA, inside))
     if not _holds_results(content):
         raise RebodyError(f"{path} holds no results of an evaluation: {WANTED}.")
     if content["version"] != VERSION:
@@ -32,17 +33,18 @@ def read_results(path: Path) -> Results:
     return results
 
 
-def holds_results(path: Path) -> bool:
-    """Whether a file is a JSON of an evaluation, be it of another version."""
+def holds_results(path: Path, inside: Path | None = None) -> bool:
+    """Whether a file is a JSON of an evaluation, be it of another version; RebodyError if it cannot be looked at."""
+    data = read_file(path, DATA, inside)
     try:
-        return _holds_results(_content(path))
+        return _holds_results(_content(path, data))
     except RebodyError:
         return False
 
 
-def _content(path: Path) -> Any:
+def _content(path: Path, data: bytes) -> Any:
     try:
-        return msgspec.json.decode(path.read_bytes())
+        return msgspec.json.decode(data)
     except msgspec.DecodeError as error:
         raise RebodyError(f"{path} is not a JSON file ({error}): {WANTED}.") from None
 

@@ -13,6 +13,7 @@ from rebody.inference.decoder import Decoder
 from rebody.inference.encoder import Encoder
 from rebody.inference.prior import Prior
 from rebody.nn import MLP
+from rebody.ranges import Copies, Decisions, NotNegative, Number, Positive, Rate
 from rebody.tasks import FAMILIES
 from rebody.types import AnyArray, GlobalState, Transition
 
@@ -29,32 +30,32 @@ class InferenceConfig:
 
     fields: tuple[str, ...] = ("x",)
     """Fields of the global state that the encoder sees; a field constant on the toy must not be among them."""
-    scales: tuple[float, ...] = (10.0,)
+    scales: tuple[Positive, ...] = (10.0,)
     """What each field is divided by [m, rad, m/s]."""
-    reward_scale: float = 10.0
+    reward_scale: Positive = 10.0
     """What the reward is divided by."""
-    window: int | None = 32
+    window: Decisions | None = 32
     """Transitions that a belief rests on; None for all since the episode began (a carried state)."""
-    latent: int = 2
+    latent: Copies = 2
     """Dimensions of the latent."""
-    kinds: int = 0
+    kinds: Number = 0
     """Dimensions of the latent, the first, that say what kind of task it is; the others say how much is asked.
     0 for a latent that is not split."""
-    units: int = 64
+    units: Copies = 64
     """Size of the recurrent state and of the hidden layers."""
-    state_weight: float = 0.1
+    state_weight: NotNegative = 0.1
     """Weight of the next state's squared error (thesis 5.5)."""
-    kl_weight: float = 1e-4
+    kl_weight: NotNegative = 1e-4
     """beta of thesis (5.7)."""
-    kind_weight: float = 100.0
+    kind_weight: NotNegative = 100.0
     """Weight of the kinds' share of the divergence, relative to the rest of a split latent."""
-    label_weight: float = 0.0
+    label_weight: NotNegative = 0.0
     """Weight of the cross-entropy on the true base task, as the ancestors had it (0.05); 0 is label-free."""
-    learning_rate: float = 2e-3
+    learning_rate: Rate = 2e-3
     """Adam's step size at the start; a cosine takes it to a twentieth."""
-    batch_size: int = 32
+    batch_size: Copies = 32
     """Windows of one update."""
-    decoded: int = 8
+    decoded: Copies = 8
     """Transitions of the same episode that each belief must explain."""
 
     @property

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from rebody.evaluation.logs import COLUMNS, BeliefOverTime
 from rebody.report.figures import FAMILY_COLOURS
-from rebody.report.style import TRUTH, figure
+from rebody.report.style import TRUTH, as_text, figure
 from rebody.tasks import FAMILIES, Family, family_index
 
 OUTLIERS = 5
@@ -38,7 +38,7 @@ def plot_beliefs(run: BeliefOverTime, path: Path) -> None:
         _latent(drawing.add_subplot(grid[:split, 1]), run)
         if split < rows:
             _clusters(drawing.add_subplot(grid[split:, 1]), run)
-        drawing.suptitle(f"What '{run.inference}' believes, from states and rewards alone")
+        drawing.suptitle(f"What '{as_text(run.inference)}' believes, from states and rewards alone")
 
 
 def _reached(axes: Axes, run: BeliefOverTime, family: Family) -> None:

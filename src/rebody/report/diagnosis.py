@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rebody.evaluation.diagnosis import LADDER, Diagnosis
 from rebody.report.figures import draw_errors
-from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, figure
+from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, as_text, figure
 
 COLOURS = dict(zip(LADDER, (ORACLE, IDLE, BELIEF, MOTION), strict=True))
 
@@ -22,4 +22,4 @@ def plot_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
             axes.set(xlabel=f"{family.name}: final error [{family.unit}]", ylabel="episodes [%]")
             axes.legend(frameon=False)
         reuse = diagnosis.results["reuse"]
-        drawing.suptitle(f"'{reuse.inference}' on {reuse.robot}: which part lost what")
+        drawing.suptitle(f"'{as_text(reuse.inference)}' on {as_text(reuse.robot)}: which part lost what")

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rebody.evaluation.results import EpisodeResult, Results
-from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TASKS, TRUTH, figure
+from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TASKS, TRUTH, as_text, figure
 from rebody.tasks import FAMILIES, family_index
 
 FAMILY_COLOURS = (MOTION, BELIEF, IDLE, ORACLE)
@@ -26,8 +26,8 @@ def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) 
         draw_beliefs(panels[columns - 1], results)
         draw_readings(panels[-1], results)
         drawing.suptitle(
-            f"Inference module '{results.inference}', trained on a point mass, on the {results.robot}: "
-            "the task is told to nobody but the oracle"
+            f"Inference module '{as_text(results.inference)}', trained on a point mass, "
+            f"on the {as_text(results.robot)}: the task is told to nobody but the oracle"
         )
 
 

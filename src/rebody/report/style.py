@@ -1,5 +1,6 @@
 """How figures look."""
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,18 @@ TASKS = "coolwarm"
 """Colour map of targets: back is blue, front is red."""
 
 
+LETTERS = 44
+"""Of a name that a user chose: more would not fit beside axes."""
+
+
+def as_text(name: str) -> str:
+    """A name that a user chose, for a figure: one line, without its middle if it is long, dollars no mathematics."""
+    line = " ".join("".join(letter if letter.isprintable() else " " for letter in name).split())
+    if len(line) > LETTERS:
+        line = f"{line[: LETTERS // 2]}…{line[-LETTERS // 2 :]}"
+    return line.replace("$", r"\$")
+
+
 @contextmanager
 def figure(
     path: Path, *shape: int, size: tuple[float, float], width_ratios: tuple[float, ...] | None = None
@@ -28,7 +41,8 @@ def figure(
         )
         try:
             yield drawing, list(axes.ravel())
-            with written_whole(path) as unfinished:
+            with written_whole(path) as unfinished, warnings.catch_warnings():
+                warnings.filterwarnings("ignore", "Glyph .* missing from font")  # a browser has more
                 drawing.savefig(unfinished, format=path.suffix[1:], dpi=120)
         finally:
             plt.close(drawing)

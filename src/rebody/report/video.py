@@ -1,9 +1,11 @@
 """A video of one episode: the robot above, what it believes below."""
 
-import os
+import subprocess
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -13,46 +15,77 @@ from jaxtyping import Float, UInt8
 
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.camera import Camera, Pole
+from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import Trial, evaluate
 from rebody.evaluation.results import EpisodeResult
 from rebody.report.figures import draw_progress
+from rebody.store.files import written_whole
 from rebody.tasks.task_file import TaskSpec
 
 WIDTH, HEIGHT, PLOT_HEIGHT = 640, 320, 240
 FRAMES_PER_S = 20
+MENDING_FFMPEG = (
+    "Install it anew (pip install --force-reinstall imageio-ffmpeg), or name one that encodes H.264 in "
+    "IMAGEIO_FFMPEG_EXE."
+)
 TRUTH_POLE, BELIEF_POLE = (0.1, 0.1, 0.1, 1.0), (0.82, 0.29, 0.36, 0.8)
 
 
 def film(trial: Trial, spec: TaskSpec, path: Path, on_progress: Callable[[float], None] | None = None) -> EpisodeResult:
     """Run one episode and write it as an MP4 in real time; returns the episode.
 
-    `on_progress` hears the finished share. RebodyError where nothing can be drawn.
+    `on_progress` hears the finished share. RebodyError where nothing can be drawn or written.
     """
     assert trial.robot is not None
+    _check_ffmpeg()
     poses: list[Float[np.ndarray, " nq"]] = []
 
     def remember(batch: RobotBatch, _: object) -> None:
         poses.append(batch.qpos[0].copy())
 
     episode = evaluate(replace(trial, on_frame=remember), [spec], 1).episodes[0]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.stem}.new{path.suffix}")
+    frames = _frames(trial.robot, poses, episode)
+    first = next(frames)  # before ffmpeg, which complains where it gets none
+    with written_whole(path) as unfinished, _ffmpeg(unfinished) as write:
+        for done, frame in chain([first], frames):
+            write(frame)
+            if on_progress is not None:
+                on_progress(done)
+    return episode
+
+
+def _check_ffmpeg() -> None:
+    """RebodyError, before an episode is run for nothing, where there is no ffmpeg that runs."""
     try:
-        size = (WIDTH, HEIGHT + PLOT_HEIGHT)
-        writer = imageio_ffmpeg.write_frames(str(unfinished), size, fps=FRAMES_PER_S, macro_block_size=1)
+        version = imageio_ffmpeg.get_ffmpeg_version()
+    except (RuntimeError, OSError, subprocess.CalledProcessError):
+        version = ""
+    if not version:  # another program has none to tell
+        raise RebodyError(f"videos need ffmpeg, and there is none that runs. {MENDING_FFMPEG}")
+
+
+@contextmanager
+def _ffmpeg(path: Path) -> Iterator[Callable[[np.ndarray | None], None]]:
+    """While inside, a function that takes the frames; RebodyError where ffmpeg fails."""
+    size = (WIDTH, HEIGHT + PLOT_HEIGHT)
+    writer = imageio_ffmpeg.write_frames(str(path), size, fps=FRAMES_PER_S, macro_block_size=1)
+
+    def write(frame: np.ndarray | None) -> None:
+        try:
+            writer.send(frame)
+        except (OSError, RuntimeError, LookupError) as error:  # it ended, or cannot encode
+            raise RebodyError(
+                f"ffmpeg could not write a video into {path.parent}. Is the disk full? {MENDING_FFMPEG}"
+            ) from error
+
+    try:
         with warnings.catch_warnings():
             # JAX warns of any fork; this one at once becomes ffmpeg
             warnings.filterwarnings("ignore", message=r"os\.fork\(\) was called")
-            writer.send(None)  # starts ffmpeg
-        for done, frame in _frames(trial.robot, poses, episode):
-            writer.send(frame)
-            if on_progress is not None:
-                on_progress(done)
-        writer.close()
-        os.replace(unfinished, path)
+            write(None)  # starts ffmpeg
+        yield write
     finally:
-        unfinished.unlink(missing_ok=True)
-    return episode
+        writer.close()
 
 
 def _frames(spec: RobotSpec, poses: list[Float[np.ndarray, " nq"]], episode: EpisodeResult):

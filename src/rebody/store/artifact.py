@@ -4,7 +4,7 @@ import difflib
 import hashlib
 import json
 import os
-import shutil
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,10 @@ import safetensors.numpy
 from safetensors import SafetensorError
 
 from rebody.errors import RebodyError
-from rebody.store.files import sync
+from rebody.store.checkpoint import holds_checkpoint
+from rebody.store.files import DATA, TEXT, output_file, read_file, reason
+from rebody.store.files import WEIGHTS as LARGEST_WEIGHTS
+from rebody.store.folders import STAGE, replace_together, settle
 from rebody.store.trees import tree_to_arrays
 
 FORMAT_VERSION = 1
@@ -23,6 +26,7 @@ SHIPPED = Path(__file__).parents[1] / "artifacts"
 WEIGHTS, CONFIG, CARD, LOG = "weights.safetensors", "config.json", "card.md", "log.csv"
 HASHED = (WEIGHTS, CONFIG, CARD, LOG)
 MANIFEST = "manifest.json"  # holds the others' hashes
+LIMITS = {WEIGHTS: LARGEST_WEIGHTS, CONFIG: TEXT, CARD: TEXT, LOG: DATA, MANIFEST: TEXT}
 
 
 @dataclass(frozen=True)
@@ -41,10 +45,11 @@ class Artifact:
 def save_artifact(path: Path, *, kind: str, config: dict[str, Any], weights: Any, card: str, log: str) -> Path:
     """Write an artifact into the folder `path`; an older artifact there stays readable until the end.
 
-    `weights` is a pytree or a dict of arrays; `config` must survive JSON. Other files in the folder are kept.
+    `weights` is a pytree or a dict of arrays; `config` must survive JSON. Other files in the folder are kept, links to
+    folders are followed.
 
     Raises:
-        RebodyError: a weight is not finite, or `path` is a file.
+        RebodyError: a weight is not finite, or the folder cannot be written to, such as on a full disk.
     """
     path = Path(os.path.abspath(path))
     arrays = tree_to_arrays(weights)
@@ -57,30 +62,30 @@ def save_artifact(path: Path, *, kind: str, config: dict[str, Any], weights: Any
         CARD: card.encode(),
         LOG: log.encode(),
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    new = path.with_name(f".{path.name}.new")
     try:
-        _write_folder(new, content | {MANIFEST: _manifest(kind, content)})
-        _replace_folder(path, new)
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
+        os.makedirs(os.path.realpath(path), exist_ok=True)
+        recover(path)
+        replace_together(path, content | {MANIFEST: _manifest(kind, content)}, commit=MANIFEST)
+    except OSError as error:
+        raise RebodyError(f"the artifact {path} cannot be written: {reason(error)}.") from error
     return path
 
 
 def load_artifact(reference: str | Path, kind: str | None = None) -> Artifact:
-    """Load a shipped artifact by name, or one from a folder; a `Path` is always a folder. Without `kind`: of any.
+    """Load a shipped artifact by name, or one from a folder. Without `kind`: of any.
+
+    A `Path` is always a folder, and so is what holds a separator, such as `./position`.
 
     Raises:
         RebodyError: it is unknown, incomplete, damaged, of another kind or of another format version.
     """
     path = _find(reference, kind)
-    manifest = _read_manifest(path)
+    manifest, content = _read_all(path)
     if kind not in (None, manifest["kind"]):
         raise RebodyError(
             f"{reference} is an artifact of kind {manifest['kind']!r}; one of kind {kind!r} is needed here. "
             + _shipped_of(kind)
         )
-    content = {name: _read_hashed(path / name, manifest["files"].get(name)) for name in HASHED}
     return Artifact(
         name=os.path.basename(os.path.abspath(reference)),
         path=path,
@@ -93,9 +98,19 @@ def load_artifact(reference: str | Path, kind: str | None = None) -> Artifact:
 
 
 def recover(path: Path) -> None:
-    """Put a folder back in its place that a save was about to replace when it was killed."""
-    if not path.exists() and _backup(path).is_dir():
-        _backup(path).rename(path)
+    """Finish a save that a kill cut short after its commit, or discard one that it cut before.
+
+    RebodyError if something else than files is where an artifact's files go.
+    """
+    for name in LIMITS:
+        output_file(path / name)
+    if not (path / STAGE).exists():
+        return
+    try:
+        hashes = _read_manifest(path)["files"]
+    except RebodyError:  # none yet, or damaged: nothing tells that what was staged belongs to it
+        hashes = {}
+    settle(path, [name for name in HASHED if _staged_hash(path, name) == hashes.get(name, "")])
 
 
 def shipped_artifacts() -> list[tuple[str, str]]:
@@ -125,47 +140,9 @@ def _manifest(kind: str, content: dict[str, bytes]) -> bytes:
     return _to_json({"format_version": FORMAT_VERSION, "kind": kind, "files": files})
 
 
-def _write_folder(folder: Path, content: dict[str, bytes]) -> None:
-    shutil.rmtree(folder, ignore_errors=True)  # left by a process that was killed
-    folder.mkdir()
-    for name, data in content.items():
-        (folder / name).write_bytes(data)
-        sync(folder / name)
-    sync(folder)
-
-
-def _backup(path: Path) -> Path:
-    return path.with_name(f".{path.name}.old")
-
-
-def _replace_folder(path: Path, new: Path) -> None:
-    """A full folder cannot be renamed over another: the old one steps aside, and back if anything fails."""
-    backup = _backup(path)
-    _retire(backup, path)
-    if path.exists():
-        os.rename(path, backup)
-    try:
-        os.rename(new, path)
-    except BaseException:
-        if backup.exists():
-            backup.rename(path)
-        raise
-    sync(path.parent)
-    _retire(backup, path)
-
-
-def _retire(backup: Path, path: Path) -> None:
-    """Remove the older artifact once `path` holds one; what is not part of it moves over to `path`."""
-    if not backup.exists():
-        return
-    if not path.exists():  # killed between the two renames
-        backup.rename(path)
-        return
-    for entry in backup.iterdir():
-        if entry.name not in (*HASHED, MANIFEST):
-            entry.rename(path / entry.name)
-    shutil.rmtree(backup)
-    sync(path.parent)
+def _staged_hash(path: Path, name: str) -> str | None:
+    staged = path / STAGE / name
+    return hashlib.sha256(staged.read_bytes()).hexdigest() if staged.is_file() else None
 
 
 # reading
@@ -173,13 +150,12 @@ def _retire(backup: Path, path: Path) -> None:
 
 def _find(reference: str | Path, kind: str | None) -> Path:
     """The folder that a shipped name or a path stands for."""
-    if isinstance(reference, str) and (SHIPPED / reference / MANIFEST).is_file():
+    is_name = isinstance(reference, str) and not {"/", os.sep} & set(reference)
+    if is_name and (SHIPPED / reference / MANIFEST).is_file():
         return SHIPPED / reference
     folder = Path(os.path.abspath(reference))
     if folder.is_dir():
         return folder
-    if _backup(folder).is_dir():  # a save was killed between its two renames
-        return _backup(folder)
     raise RebodyError(_unknown(str(reference), kind))
 
 
@@ -199,8 +175,23 @@ def _shipped_of(kind: str | None) -> str:
     return f"Shipped artifacts{of_kind}: {names}. Give one of these, or a folder of your own."
 
 
+def _read_all(path: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """The manifest and what belongs to it, while another process may be saving."""
+    manifest = _read_manifest(path)
+    while True:
+        try:
+            return manifest, {name: _read_hashed(path, name, manifest["files"].get(name)) for name in HASHED}
+        except RebodyError:
+            before, manifest = manifest, _read_manifest(path)
+            if manifest == before:  # else a new artifact took the place of the one that was being read
+                raise
+
+
 def _read_manifest(path: Path) -> dict[str, Any]:
-    manifest = _parse_object(_read(path / MANIFEST), path / MANIFEST)
+    try:
+        manifest = _parse_object(_read(path, MANIFEST), path / MANIFEST)
+    except FileNotFoundError:
+        raise _missing(path, MANIFEST) from None
     version, kind, files = (manifest.get(key) for key in ("format_version", "kind", "files"))
     if version is None or not isinstance(kind, str) or not isinstance(files, dict):
         raise _damaged(path / MANIFEST)
@@ -212,20 +203,19 @@ def _read_manifest(path: Path) -> dict[str, Any]:
     return manifest
 
 
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise RebodyError(
-            f"{path.parent} is not a complete artifact: {path.name} is missing. Copy or make it anew."
-        ) from None
+def _read(path: Path, name: str, folder: str = "") -> bytes:
+    inside = None if path.parent == SHIPPED else path  # some installers lay out packages as links
+    return read_file(path / folder / name, LIMITS[name], inside)
 
 
-def _read_hashed(path: Path, sha256: Any) -> bytes:
-    data = _read(path)
-    if hashlib.sha256(data).hexdigest() != sha256:
-        raise _damaged(path)
-    return data
+def _read_hashed(path: Path, name: str, sha256: Any) -> bytes:
+    """From its place, or from where a save that is going on, or was cut short, has it; by then it may have moved."""
+    for folder in ("", STAGE, ""):
+        with suppress(FileNotFoundError):
+            data = _read(path, name, folder)
+            if hashlib.sha256(data).hexdigest() == sha256:
+                return data
+    raise _damaged(path / name) if (path / name).exists() else _missing(path, name)
 
 
 def _parse_object(data: bytes, path: Path) -> dict[str, Any]:
@@ -243,6 +233,15 @@ def _parse_weights(data: bytes, path: Path) -> dict[str, np.ndarray]:
         return safetensors.numpy.load(data)
     except SafetensorError as error:
         raise _damaged(path) from error
+
+
+def _missing(path: Path, name: str) -> RebodyError:
+    if name == MANIFEST and holds_checkpoint(path):
+        return RebodyError(
+            f"{path} holds an unfinished run: go on with it by the same command and `--resume`, or make an artifact of "
+            "it as it stands with `--resume --finish`."
+        )
+    return RebodyError(f"{path} is not a complete artifact: {name} is missing. Copy or make it anew.")
 
 
 def _damaged(path: Path) -> RebodyError:

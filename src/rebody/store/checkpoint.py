@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,30 +17,45 @@ import safetensors.numpy
 from safetensors import SafetensorError, safe_open
 
 from rebody.errors import RebodyError
-from rebody.store.files import sync
+from rebody.store.files import MB, check_file, reason, sync
 from rebody.store.trees import arrays_into_tree, tree_hash, tree_to_arrays
 from rebody.types import Tree
 
 FORMAT_VERSION = "1"
-FILE = "checkpoint.safetensors"
+FOLDER, FILE = "checkpoint", "checkpoint.safetensors"
+"""Of a run's folder, and in that one."""
+LARGEST = 64_000 * MB
+"""It is mapped, not read: this only tells a checkpoint from what cannot be one."""
 
 
 def save_checkpoint(folder: Path, state: Any, meta: dict[str, Any]) -> None:
     """Replace the folder's checkpoint by `state` (any pytree of arrays) and `meta` (JSON).
 
-    A crash at any moment leaves the old checkpoint or the new one.
+    A crash at any moment leaves the old checkpoint or the new one; so does a full disk, which is a RebodyError.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     arrays, meta_json = tree_to_arrays(state), json.dumps(meta)
     header = {"format_version": FORMAT_VERSION, "meta": meta_json, "sha256": _sha256(arrays, meta_json)}
     new = folder / f"{FILE}.new"
     try:
+        folder.mkdir(parents=True, exist_ok=True)
+        new.unlink(missing_ok=True)
         safetensors.numpy.save_file(arrays, new, metadata=header)
         sync(new)
         os.replace(new, folder / FILE)
+        sync(folder)
+    except (OSError, SafetensorError) as error:  # of a full disk safetensors says so in its own error
+        raise RebodyError(
+            f"the checkpoint {folder / FILE} cannot be written: {reason(error)}. The one before is still there: "
+            "mend this, then go on with --resume."
+        ) from error
     finally:
-        new.unlink(missing_ok=True)
-    sync(folder)
+        with suppress(OSError):
+            new.unlink(missing_ok=True)
+
+
+def holds_checkpoint(out: Path) -> bool:
+    """Whether a run's folder has one."""
+    return (out / FOLDER / FILE).exists()
 
 
 def load_checkpoint(
@@ -88,6 +104,7 @@ def _sha256(arrays: dict[str, np.ndarray], meta_json: str) -> str:
 
 
 def _read(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray]]:
+    check_file(path, LARGEST, inside=path.parent)
     try:
         with safe_open(path, framework="np") as file:
             return file.metadata() or {}, file.get_tensors()

@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import PRNGKeyArray
 
+from rebody.ranges import Finite
 from rebody.tasks.families import family_index
 from rebody.types import Task
 
@@ -15,8 +17,8 @@ class BaseTask:
     """A family with one range of targets; the thesis counts front and back as two."""
 
     family: str
-    low: float
-    high: float
+    low: Finite
+    high: Finite
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,12 @@ class TaskDistribution:
         low = jnp.asarray([task.low for task in self.base_tasks])[which]
         high = jnp.asarray([task.high for task in self.base_tasks])[which]
         return Task(family, low + (high - low) * jax.random.uniform(where_key, shape))
+
+    def draw(self, rng: np.random.Generator) -> Task:
+        """One task from NumPy's generator, which no setting of JAX changes."""
+        base_task = self.base_tasks[rng.integers(len(self.base_tasks))]
+        target = rng.uniform(base_task.low, base_task.high)
+        return Task(np.asarray(family_index(base_task.family)), np.asarray(target))
 
     def sample_episodes(self, key: PRNGKeyArray, episodes: int, decisions: int, switch_share: float) -> Task:
         """The active tasks of episodes, [episode, decision]: a share of them changes once, at any decision."""

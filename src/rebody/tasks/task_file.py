@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from rebody import inputs
 from rebody.errors import RebodyError
+from rebody.store.files import TEXT, read_file
 from rebody.tasks.families import family_index
 from rebody.types import Task
 
 EXAMPLE = '[{"family": "goal", "target": -9.0}]'
-LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class TaskSpec:
 def read_tasks(path: Path) -> list[TaskSpec]:
     """The tasks of a file; RebodyError that names the entry and what is wrong with it."""
     try:
-        content = json.loads(path.read_text())
+        content = json.loads(read_file(path, TEXT).decode("utf-8-sig"))
     except FileNotFoundError:
         raise RebodyError(f"there is no task file {path}.") from None
     except (ValueError, RecursionError, OSError) as error:
@@ -55,7 +56,7 @@ def parse_task(text: str) -> TaskSpec:
     """A task written FAMILY=TARGET, such as goal=-9."""
     family, equals, target = text.partition("=")
     try:
-        entry = {"family": family, "target": float(target)}
+        entry = None if "_" in target else {"family": family, "target": float(target)}
     except ValueError:
         entry = None
     if not equals or entry is None:
@@ -80,9 +81,8 @@ def _task(entry: Any, where: str) -> TaskSpec:
     switch = entry.get("switch")
     if switch is not None:
         _check_keys(switch, {"at_s", "family", "target"}, set(), f"{where}, switch")
-        switch = Switch(
-            _number(switch["at_s"], f"{where}, switch, at_s"), *_family_and_target(switch, f"{where}, switch")
-        )
+        at_s = inputs.number(switch["at_s"], "'at_s'", f"{where}, switch")
+        switch = Switch(at_s, *_family_and_target(switch, f"{where}, switch"))
         if switch.at_s < 0:
             raise RebodyError(f"{where}: the switch cannot be before the start (at_s = {switch.at_s}).")
     return TaskSpec(*_family_and_target(entry, where), switch)
@@ -104,10 +104,4 @@ def _family_and_target(entry: dict[str, Any], where: str) -> tuple[str, float]:
         family_index(entry["family"])
     except RebodyError as error:
         raise RebodyError(f"{where}: {error}") from None
-    return entry["family"], _number(entry["target"], f"{where}, target")
-
-
-def _number(value: Any, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
-        raise RebodyError(f"{where}: expected a finite number, got {json.dumps(value)}.")
-    return float(value)
+    return entry["family"], inputs.number(entry["target"], "the target", where)

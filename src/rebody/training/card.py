@@ -18,9 +18,10 @@ def card(title: str, what: str, run: Run, seed: int, figures: Mapping[str, str])
     """Markdown: what it is, the exact command and seed that made it, wall time, machine, figures."""
     machine = f"{os.cpu_count()} x {_processor()}, {platform.system()}, Python {platform.python_version()}"
     rows = "\n".join(f"| {name} | {value} |" for name, value in figures.items())
+    remarks = "".join(f"- {remark}\n" for remark in run.remarks)
     return (
         f"# {title}\n\n{what}\n\n"
-        f"- Made by: `{command_line()}`\n- Seed: {seed}\n- Training time: {run.wall_s / 60:.1f} minutes\n"
+        f"- Made by: `{command_line()}`\n- Seed: {seed}\n- Training time: {run.wall_s / 60:.1f} minutes\n{remarks}"
         f"- Machine: {machine}\n- Versions: {versions()}\n\n"
         f"Measured by the same command after training:\n\n| figure | value |\n|---|---|\n{rows}\n"
     )
@@ -28,8 +29,10 @@ def card(title: str, what: str, run: Run, seed: int, figures: Mapping[str, str])
 
 def command_line() -> str:
     """The command that is running, fit for a shell."""
-    # a resumed run ends as the uninterrupted one would have
-    return shlex.join([Path(sys.argv[0]).name, *(argument for argument in sys.argv[1:] if argument != "--resume")])
+    arguments = sys.argv[1:]
+    if "--finish" not in arguments:  # a resumed run ends as the uninterrupted one would have
+        arguments = [argument for argument in arguments if argument != "--resume"]
+    return shlex.join([Path(sys.argv[0]).name, *arguments])
 
 
 def versions() -> str:

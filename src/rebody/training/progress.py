@@ -8,6 +8,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 LINE_EVERY_S = 30.0
+LONG_S = 3600.0
+"""What takes longer says so as soon as that is known."""
+TIMED = 3
+"""Iterations after which it is: the first of them compile."""
 
 Metrics = dict[str, float]
 Show = Callable[[int, Metrics], None]
@@ -17,9 +21,20 @@ Show = Callable[[int, Metrics], None]
 @contextmanager
 def progress(label: str, total: int, done: int) -> Iterator[Show]:
     """Show a run of `total` iterations of which `done` are behind it, with an estimate of what is left."""
-    console = Console(stderr=True)
+    console, begun = Console(stderr=True, soft_wrap=True), time.monotonic()
     with _bar(label, total, done, console) if console.is_terminal else _lines(label, total, done, console) as show:
-        yield show
+
+        def show_and_warn(iteration: int, metrics: Metrics) -> None:
+            show(iteration, metrics)
+            left = (time.monotonic() - begun) / (iteration - done) * (total - iteration)
+            if iteration - done == TIMED and left > LONG_S:
+                console.print(
+                    f"{label}: this will take about {left / 3600:.1f} hours. Ctrl-C saves the run; the same command "
+                    "with --resume goes on with it.",
+                    highlight=False,
+                )
+
+        yield show_and_warn
 
 
 @contextmanager

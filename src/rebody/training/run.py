@@ -9,17 +9,20 @@ import io
 import json
 import signal
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from itertools import accumulate
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import IO, Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
-from tensorboardX import SummaryWriter
 
 from rebody.errors import RebodyError
-from rebody.store import load_checkpoint, recover, save_checkpoint, tree_to_arrays
+from rebody.store import holds_checkpoint, load_checkpoint, recover, save_checkpoint, take_folder, tree_to_arrays
+from rebody.store.artifact import MANIFEST
+from rebody.store.checkpoint import FOLDER
+from rebody.training.curves import Curves
 from rebody.training.progress import Metrics, progress
 
 SHOWN_FAULTS = 5
@@ -40,44 +43,110 @@ class Interrupted(Exception):
 
 
 class Run:
-    """One training run in a folder."""
+    """One training run in a folder, which is its own from `restore` to the end of the `with` block."""
 
-    def __init__(self, out: Path, settings: dict[str, Any], *, resume: bool = False, checkpoint_every_s: float = 120.0):
-        """`settings` identify the run: a checkpoint made with others is not resumed."""
+    def __init__(
+        self,
+        out: Path,
+        settings: dict[str, Any],
+        *,
+        length: Sequence[str] = ("iterations",),
+        resume: bool = False,
+        finish: bool = False,
+        checkpoint_every_s: float = 120.0,
+    ):
+        """`settings` identify the run: a checkpoint made with others is not resumed.
+
+        But for those called `length`, numbers of iterations that follow one another: what is still to come of them may
+        change. With `finish` no iteration is taken: what was done is all.
+        """
         self.out = out
         self.settings = json.loads(json.dumps(settings))
-        self.resume = resume
+        self.resume = resume or finish
+        self.finish = finish
         self.checkpoint_every_s = checkpoint_every_s
         self.wall_s = 0.0
         """Seconds of training so far, over all resumptions."""
         self.history: list[Metrics] = []
         """What every iteration measured."""
-        recover(out)
-        if out.exists() and not out.is_dir():
-            raise RebodyError(f"{out} is a file; a run needs a folder. Choose another --out.")
-        if not resume and ((out / "checkpoint").exists() or (out / "manifest.json").exists()):
-            raise RebodyError(f"{out} already holds a run. Add --resume to go on with it, or choose another --out.")
+        self.changes: list[str] = []
+        """How its length was changed in the middle of it."""
+        self._length = length
+        self._lock: IO[bytes] | None = None
+        self._check_folder()
+
+    def __enter__(self) -> "Run":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._lock is not None:
+            self._lock.close()
+
+    def _check_folder(self) -> None:
+        if self.out.exists() and not self.out.is_dir():
+            raise RebodyError(f"{self.out} is a file; a run needs a folder. Choose another --out.")
+        if not self.resume and ((self.out / FOLDER).exists() or (self.out / MANIFEST).exists()):
+            raise RebodyError(
+                f"{self.out} already holds a run. Add --resume to go on with it, or choose another --out."
+            )
+        if self.finish and not holds_checkpoint(self.out):
+            raise RebodyError(f"{self.out} holds no checkpoint of a run that --finish could make an artifact of.")
 
     def restore(self, state: State) -> State:
-        """The checkpointed state if this run is resumed and has one, else the given fresh one."""
+        """Take the folder; the checkpointed state if this run is resumed and has one, else the given fresh one.
+
+        RebodyError if another run has the folder, or nothing can be saved there: before training, not after it.
+        """
+        self._lock = take_folder(self.out)
+        self._check_folder()  # again: now nobody else changes it
+        recover(self.out)
         found = load_checkpoint(self._checkpoint, state, self._check_settings) if self.resume else None
         if found is None:
             return state
         state, meta = found
-        self.wall_s, self.history = meta["wall_s"], meta["history"]
+        self.wall_s, self.history, self.changes = meta["wall_s"], meta["history"], meta.get("changes", [])
+        before = {name: meta["settings"][name] for name in self._length}
+        if self.finish:
+            self.settings |= before
+        elif before != self.length:
+            self.changes.append(f"{_written(before)} until iteration {self.iterations}, then {_written(self.length)}")
         return state
 
     def _check_settings(self, meta: dict[str, Any]) -> None:
-        if meta["settings"] != self.settings:
-            changed = sorted(
-                name
-                for name in meta["settings"].keys() | self.settings.keys()
-                if meta["settings"].get(name) != self.settings.get(name)
-            )
+        before, now, done = meta["settings"], self.settings, len(meta["history"])
+        changed = {name for name in before.keys() | now.keys() if before.get(name) != now.get(name)}
+        if others := sorted(changed.difference(self._length)):
             raise RebodyError(
-                f"cannot resume {self.out}: it was begun with other settings ({', '.join(changed)}). "
+                f"cannot resume {self.out}: it was begun with other settings ({', '.join(others)}). "
                 "Use the same ones, or choose another --out."
             )
+        if changed and not self.finish and self._ends(before, done) != self._ends(now, done):
+            raise RebodyError(
+                f"cannot resume {self.out}: {done} iterations are done, and {_written(self.length)} would undo some of "
+                f"them (before: {_written({name: before[name] for name in self._length})}). Change what is still to "
+                "come only, or make an artifact of what is done with --finish."
+            )
+
+    def _ends(self, settings: dict[str, Any], done: int) -> list[int]:
+        """When each part of the run ends, as far as it is done."""
+        return [min(end, done) for end in accumulate(settings[name] for name in self._length)]
+
+    @property
+    def length(self) -> dict[str, int]:
+        """The settings that say how long the run is, or was to be."""
+        return {name: self.settings[name] for name in self._length}
+
+    @property
+    def iterations(self) -> int:
+        """How many are done."""
+        return len(self.history)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What its artifact's card must say, since its command alone does not lead to it."""
+        planned = sum(self.length.values())
+        stopped = [f"Unfinished: stopped after {self.iterations} of {planned} iterations"]
+        return [f"Length: {change}" for change in self.changes] + (stopped if self.iterations < planned else [])
 
     @property
     def log(self) -> str:
@@ -94,21 +163,23 @@ class Run:
         self, state: State, iterate: Callable[[State], tuple[State, Metrics]], iterations: int, label: str
     ) -> State:
         """Take turns until `iterations` are done; Interrupted after Ctrl-C, RebodyError if a loss diverges."""
+        if self.finish:
+            return state
         begun, saved = time.monotonic() - self.wall_s, time.monotonic()
         with (
             progress(label, iterations, int(state.iteration)) as show,
             _interrupts() as interrupted,
-            # a killed run has told of turns that it takes again
-            SummaryWriter(str(self.out / "events"), purge_step=int(state.iteration) + 1) as writer,
+            closing(Curves(self.out / "events", int(state.iteration) + 1)) as curves,
         ):
             while int(state.iteration) < iterations:
                 state, metrics = iterate(state)
                 _check_finite(metrics, self.out)
                 self.wall_s = time.monotonic() - begun
-                self._log(writer, metrics, int(state.iteration))
+                self._log(curves, metrics, int(state.iteration))
                 show(int(state.iteration), metrics)
                 if interrupted() or time.monotonic() - saved > self.checkpoint_every_s:
                     self._save(state)
+                    curves.flush()
                     saved = time.monotonic()
                 if interrupted():
                     raise Interrupted(f"stopped; go on with the same command and --resume ({self.out})")
@@ -117,17 +188,16 @@ class Run:
 
     @property
     def _checkpoint(self) -> Path:
-        return self.out / "checkpoint"
+        return self.out / FOLDER
 
     def _save(self, state: RunState) -> None:
         _check_finite(_faults(state), self.out)  # the last update may have broken what no loss shows yet
-        meta = {"settings": self.settings, "wall_s": self.wall_s, "history": self.history}
+        meta = {"settings": self.settings, "wall_s": self.wall_s, "history": self.history, "changes": self.changes}
         save_checkpoint(self._checkpoint, state, meta)
 
-    def _log(self, writer: SummaryWriter, metrics: Metrics, iteration: int) -> None:
+    def _log(self, curves: Curves, metrics: Metrics, iteration: int) -> None:
         self.history.append(metrics)
-        for name, value in metrics.items():
-            writer.add_scalar(name, value, iteration)
+        curves.add(metrics, iteration)
 
 
 def read_log(text: str) -> dict[str, Float[np.ndarray, " iteration"]]:
@@ -151,6 +221,10 @@ def _interrupts() -> Iterator[Callable[[], bool]]:
         yield lambda: noted
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def _written(length: dict[str, int]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in length.items())
 
 
 def _faults(state: RunState) -> Metrics:

@@ -3,13 +3,15 @@
 import math
 import queue
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import viser
 
 from rebody.agents.build import AGENTS
+from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import Trial
+from rebody.inputs import number
 from rebody.tasks import FAMILIES, family_index, family_names
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
@@ -17,8 +19,8 @@ from rebody.viewer.session import target_range
 
 PUSHES = {"-1": -1.0, "-0.5": -0.5, "+0.5": 0.5, "+1": 1.0}
 """What buttons say, and what they add to the velocity [m/s]."""
-SPEEDS = (0.1, 2.0)
-"""Slowest and fastest simulation, in simulated seconds per second."""
+SPEEDS, REAL_TIME = (0.1, 2.0), 1.0
+"""Slowest and fastest simulation, and the one to begin with, in simulated seconds per second."""
 FARTHEST_DRAWN = 0.4
 """A task that is drawn at random asks for at least this share of the largest target."""
 
@@ -38,6 +40,12 @@ class Offered:
 
     robots: Sequence[str]
     inferences: Sequence[str]
+
+    def check(self, choice: Choice) -> None:
+        """RebodyError unless all of a choice is offered: a name may be a path, and its file would be opened."""
+        _check_among(self.robots, choice.robot, "robot")
+        _check_among(self.inferences, choice.inference, "module")
+        _check_among(AGENTS, choice.agent, "agent")
 
 
 @dataclass(frozen=True)
@@ -59,15 +67,27 @@ class Restart:
     """Back to the start."""
 
 
-Order = Choice | GiveTask | Push | Restart
+@dataclass(frozen=True)
+class Refused:
+    """What a browser sent is not offered."""
+
+    why: str
+
+
+Order = Choice | GiveTask | Push | Restart | Refused
 
 
 class Controls:
-    """Widgets; orders wait in `orders` until the page gets to them."""
+    """Widgets; orders wait in `orders` until the page gets to them.
+
+    viser writes into a widget what a browser sends, of the widget's type but else unchecked. So values are checked when
+    they become an order.
+    """
 
     def __init__(self, gui: viser.GuiApi, offered: Offered, choice: Choice):
         self.orders: queue.SimpleQueue[Order] = queue.SimpleQueue()
         self.paused = False
+        self._offered = offered
         self._ranges: dict[str, tuple[float, float]] = {}
         gui.add_markdown(words.INTRODUCTION)
         self._status = gui.add_html("")
@@ -84,7 +104,7 @@ class Controls:
             self._pushes = gui.add_button_group(
                 "Push [m/s]", tuple(PUSHES), hint="Changes the velocity of all its parts"
             )
-            self._speed = gui.add_slider("Speed [x]", *SPEEDS, 0.1, 1.0, hint="Simulated seconds per second")
+            self._speed = gui.add_slider("Speed [x]", *SPEEDS, 0.1, REAL_TIME, hint="Simulated seconds per second")
             self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
             self._restart = gui.add_button("Restart", icon=viser.Icon.REFRESH, color="gray")
         with gui.add_folder("Who is watched"):
@@ -97,8 +117,13 @@ class Controls:
 
     @property
     def speed(self) -> float:
-        """Simulated seconds per second that are asked for."""
-        return self._speed.value
+        """Simulated seconds per second that are asked for; where the slider is off its range, it is put back."""
+        try:
+            speed = _within(number(self._speed.value, "the speed"), SPEEDS)
+        except RebodyError:
+            speed = REAL_TIME
+        self._speed.value = speed
+        return speed
 
     def show_choice(self, choice: Choice) -> None:
         """Who is watched now."""
@@ -116,27 +141,49 @@ class Controls:
         """A line about what goes on."""
         self._status.content = html
 
+    def pause(self, paused: bool = True) -> None:
+        """Let the simulation stand still, or go on."""
+        self.paused = paused
+        self._pause.label = "Go on" if paused else "Pause"
+        self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
+
     def _connect(self) -> None:
-        order = self.orders.put
-        self._give.on_click(lambda _: order(GiveTask(TaskSpec(self._family.value, self._target.value))))
-        self._draw.on_click(lambda _: order(GiveTask(self._any_task())))
-        self._pushes.on_click(lambda event: order(Push(PUSHES[event.target.value])))
-        self._restart.on_click(lambda _: order(Restart()))
-        self._pause.on_click(lambda _: self._toggle_pause())
-        self._family.on_update(lambda _: self._show_range(self._family.value))
+        self._give.on_click(self._ordering(lambda _: GiveTask(self._chosen_task())))
+        self._draw.on_click(self._ordering(lambda _: GiveTask(self._any_task())))
+        self._pushes.on_click(self._ordering(lambda event: _push(event.target.value)))
+        self._restart.on_click(self._ordering(lambda _: Restart()))
+        self._pause.on_click(lambda _: self.pause(not self.paused))
+        self._family.on_update(self._ordering(lambda _: self._show_range(self._family.value)))
         for who in (self._robot, self._inference, self._agent):
-            who.on_update(self._choose)
+            who.on_update(self._ordering(self._choose))
 
-    def _choose(self, event: viser.GuiEvent) -> None:
-        if event.client is not None:  # else `show_choice` did it
-            self.orders.put(Choice(self._robot.value, self._inference.value, self._agent.value))
+    def _ordering(self, order: Callable[[viser.GuiEvent], Order | None]) -> Callable[[viser.GuiEvent], None]:
+        """A callback that passes on the order, if there is one, or why it is refused."""
 
-    def _toggle_pause(self) -> None:
-        self.paused = not self.paused
-        self._pause.label = "Go on" if self.paused else "Pause"
-        self._pause.icon = viser.Icon.PLAYER_PLAY if self.paused else viser.Icon.PLAYER_PAUSE
+        def callback(event: viser.GuiEvent) -> None:
+            try:
+                made = order(event)
+            except RebodyError as error:
+                made = Refused(str(error))
+            if made is not None:
+                self.orders.put(made)
+
+        return callback
+
+    def _choose(self, event: viser.GuiEvent) -> Choice | None:
+        if event.client is None:  # `show_choice` did it
+            return None
+        choice = Choice(self._robot.value, self._inference.value, self._agent.value)
+        self._offered.check(choice)
+        return choice
+
+    def _chosen_task(self) -> TaskSpec:
+        family = self._family.value
+        _check_among(self._ranges, family, "kind of task")
+        return TaskSpec(family, _within(number(self._target.value, "the target"), self._ranges[family]))
 
     def _show_range(self, family: str, target: float | None = None) -> None:
+        _check_among(self._ranges, family, "kind of task")
         low, high = self._ranges[family]
         self._target.label = f"Target [{FAMILIES[family_index(family)].unit}]"
         self._target.min, self._target.max = low, high
@@ -153,3 +200,17 @@ class Controls:
 
 def _in_tenths(low: float, high: float) -> tuple[float, float]:
     return math.ceil(10 * low) / 10, math.floor(10 * high) / 10
+
+
+def _push(button: str) -> Push:
+    _check_among(PUSHES, button, "push")
+    return Push(PUSHES[button])
+
+
+def _check_among(offered: Collection[str], name: str, what: str) -> None:
+    if name not in offered:
+        raise RebodyError(f"this {what} is not offered here.")
+
+
+def _within(value: float, ends: tuple[float, float]) -> float:
+    return min(max(value, ends[0]), ends[1])

@@ -1,5 +1,7 @@
 """The page: a session in real time, shown to and meddled with by all browsers that look."""
 
+import logging
+import queue
 import threading
 import time
 from collections.abc import Callable
@@ -10,7 +12,7 @@ from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import Trial
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
-from rebody.viewer.controls import Choice, Controls, GiveTask, Offered, Order, Push, Restart
+from rebody.viewer.controls import Choice, Controls, GiveTask, Offered, Order, Push, Refused, Restart
 from rebody.viewer.pace import Pace
 from rebody.viewer.panel import BeliefPanel
 from rebody.viewer.scene import Scene
@@ -20,6 +22,10 @@ CONTROLS_PX = 320
 """Width of the panel of controls."""
 FRAME_S, LATENT_S = 1 / 40, 0.25
 """Real seconds from one picture of the body, and of the latent, to the next."""
+STEADY_S = 1.0
+"""A session that fails before this simulated time [s] would fail again after a restart."""
+AGAIN = "The robot is back at the start."
+PAUSED = "It failed straight after a start, so the page is paused. Choose another task or robot, then press Go on."
 
 
 class Page:
@@ -47,12 +53,13 @@ class Page:
 
     def run(self) -> None:
         """Until `end` is called; time stands still while nobody looks."""
-        self._watch(*self._first)
+        choice, trial, task = self._first
+        self.controls.show_status(words.loading(choice.robot))
+        self._watch(choice, Session(trial, task))
         while not self._ended.wait(FRAME_S):
             self._obey()
             if self._server.get_clients():
-                self._advance(time.monotonic())
-                self._show(time.monotonic())
+                self._go_on()
             else:
                 self._pace.wait(time.monotonic())
 
@@ -60,14 +67,12 @@ class Page:
         """Let `run` return; any thread may call this."""
         self._ended.set()
 
-    def _watch(self, choice: Choice, trial: Trial, task: TaskSpec) -> None:
-        """Begin a session, in place of the one before."""
-        self.controls.show_status(words.loading(choice.robot))
-        self.session = Session(trial, task)
-        self._scene = Scene(self._server, self.session.body.model)
-        self._panel.listen_to(trial.inference)
-        self._choice = choice
-        self.controls.show_task(trial, task)
+    def _watch(self, choice: Choice, session: Session) -> None:
+        """Show that session, in place of the one before."""
+        self._scene = Scene(self._server, session.body.model)
+        self._panel.listen_to(session.trial.inference)
+        self.controls.show_task(session.trial, session.task)
+        self._choice, self.session = choice, session
         self._begin()
 
     def _begin(self) -> None:
@@ -78,20 +83,19 @@ class Page:
         self._latent_due = 0.0
 
     def _obey(self) -> None:
-        """Do what was clicked; what cannot be done is said on the page."""
-        while not self.controls.orders.empty():
+        """Do what was clicked; what cannot be done is said on the page, and the controls go back to what is."""
+        for order in _waiting(self.controls.orders):
             try:
-                self._carry_out(self.controls.orders.get())
-            except RebodyError as error:
+                self._carry_out(order)
+            except Exception as error:
                 self._complain(error)
                 self.controls.show_choice(self._choice)
+                self.controls.show_task(self.session.trial, self.session.task)
 
     def _carry_out(self, order: Order) -> None:
         match order:
             case Choice():
-                self.controls.show_status(words.loading(order.robot))
-                trial = self._load(order)
-                self._watch(order, trial, fitting(trial, self.session.task))
+                self._change_to(order)
             case GiveTask(task):
                 self.session.set_task(task)
                 self.controls.show_task(self.session.trial, task)
@@ -100,18 +104,47 @@ class Page:
             case Restart():
                 self.session.restart()
                 self._begin()
+            case Refused(why):
+                raise RebodyError(why)
+
+    def _change_to(self, choice: Choice) -> None:
+        self.controls.show_status(words.loading(choice.robot))
+        trial = self._load(choice)
+        session = Session(trial, fitting(trial, self.session.task))
+        try:
+            self._watch(choice, session)
+        except Exception:  # it cannot be drawn
+            self._watch(self._choice, self.session)
+            raise
+
+    def _go_on(self) -> None:
+        """Simulate and show; the page outlives whatever goes wrong in a session."""
+        try:
+            self._advance(time.monotonic())
+            self._show(time.monotonic())
+        except Exception as error:
+            self._recover(error)
+
+    def _recover(self, error: Exception) -> None:
+        """From the start after a fault; paused where that would fail again, for ever."""
+        if self.controls.paused:  # nothing is simulated: it was said before
+            return
+        hopeless = self.session.time_s < STEADY_S
+        try:
+            self._carry_out(Restart())
+        except Exception as second:
+            error, hopeless = second, True
+        self._complain(error, PAUSED if hopeless else AGAIN)
+        if hopeless:
+            self.controls.pause()
 
     def _advance(self, now: float) -> None:
         """Simulate what is due."""
         if self.controls.paused:
             self._pace.wait(now)
             return
-        try:
-            for _ in range(self._pace.due(now, self.controls.speed)):
-                self.session.step()
-        except RebodyError as error:  # the simulation diverged
-            self._complain(error)
-            self._carry_out(Restart())
+        for _ in range(self._pace.due(now, self.controls.speed)):
+            self.session.step()
 
     def _show(self, now: float) -> None:
         """Bring the page up to date with the session."""
@@ -129,6 +162,22 @@ class Page:
             self._drawn, self._latent_due = moment, now + LATENT_S
             self._panel.show_latent([*session.moments])
 
-    def _complain(self, error: RebodyError) -> None:
+    def _complain(self, error: Exception, then: str = "") -> None:
+        """Say on all open pages what went wrong; what is no fault of a user is logged, too."""
+        says = str(error)
+        if not isinstance(error, RebodyError):
+            logging.getLogger(__name__).error("the live page goes on after:", exc_info=error)
+            says = f"An unexpected error ({type(error).__name__}: {error}); the terminal shows where."
         for client in self._server.get_clients().values():
-            client.add_notification("This does not work", str(error), color="red", auto_close_seconds=12.0)
+            client.add_notification(
+                "This does not work", f"{says} {then}".strip(), color="red", auto_close_seconds=12.0
+            )
+
+
+def _waiting(orders: queue.SimpleQueue[Order]) -> list[Order]:
+    """All that wait; of choices only the last, since each takes seconds to load."""
+    waiting: list[Order] = []
+    while not orders.empty():
+        waiting.append(orders.get())
+    choices = [order for order in waiting if isinstance(order, Choice)]
+    return [order for order in waiting if not isinstance(order, Choice) or order is choices[-1]]

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 import viser
 
 from rebody.errors import RebodyError
+from rebody.viewer.door import guarded
 
 HOST = "127.0.0.1"
 """This machine alone: who sees the page can move the robot."""
@@ -14,10 +15,13 @@ HOST = "127.0.0.1"
 
 @contextmanager
 def serving(port: int) -> Iterator[viser.ViserServer]:
-    """A server at that port (0: any free one), stopped at the end; RebodyError where the port is taken."""
+    """A server at that port (0: any free one), stopped at the end; RebodyError where it is taken or has no guard."""
     _check_free(port)
-    server = viser.ViserServer(host=HOST, port=port, label="rebody", verbose=False)
+    with guarded() as is_guarded:
+        server = viser.ViserServer(host=HOST, port=port, label="rebody", verbose=False)
     try:
+        if not is_guarded.is_set():
+            raise RebodyError(f"viser {viser.__version__} starts in a way that cannot be guarded; install viser 1.1.1.")
         yield server
     finally:
         server.stop()

@@ -11,6 +11,7 @@ from rebody.agents.belief import Reading
 from rebody.agents.clock import begin, decide
 from rebody.agents.rollout import task_reward
 from rebody.evaluation.evaluate import Trial, check_trial, trial_agent, trial_controller
+from rebody.inputs import number
 from rebody.tasks import FAMILIES
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, GlobalState
@@ -78,15 +79,18 @@ class Session:
         return self._steps * self.body.step_s
 
     def set_task(self, task: TaskSpec) -> None:
-        """Another hidden task from now on; only the oracle is told. RebodyError if the module cannot infer it."""
+        """Another hidden task from now on; only the oracle is told. RebodyError if the module cannot infer it
+        or its target is no number; the task before then stays.
+        """
+        number(task.target, "the target")
         check_trial(self.trial, [task])
-        self.task = task
-        self._tasks = active_tasks([task], 1, DECISION_DT)
-        self._agent = trial_agent(self.trial, self._tasks)
+        tasks = active_tasks([task], 1, DECISION_DT)
+        self._agent = trial_agent(self.trial, tasks)
+        self.task, self._tasks = task, tasks
 
     def push(self, change: float) -> None:
-        """Change the velocity of the body's centre of mass along x [m/s]."""
-        self.body.push(change)
+        """Change the velocity of the body's centre of mass along x [m/s]; RebodyError if that is no number."""
+        self.body.push(number(change, "the push"))
 
     def _decide(self) -> None:
         state, form = self.body.observe(), self.trial.inference.contract.reward

@@ -108,3 +108,33 @@ def test_the_table_holds_what_was_heard_and_believed(believed, episodes, tmp_pat
         assert [float(row[f"cluster_{k}"]) for k in reading.responsibilities] == pytest.approx(
             list(reading.responsibilities.values()), abs=1e-5
         )
+
+
+def test_nothing_is_heard_in_a_gap(module, believed, episodes, write):
+    """There the belief stays; after it, it goes on with what the agent would have believed without those decisions."""
+    columns = columns_of(episodes)
+    lost = np.r_[41:50]  # decisions 40 to 49
+    damaged = {name: np.delete(values, lost) for name, values in columns.items()}
+    fields = module.contract.fields
+    run = believe(module, resample(read_log(write(**damaged), fields, skip_bad_rows=True), fields))
+    belief = module.begin({"x": 0.0, "vx": 0.0})
+    for i in range(1, DECISIONS + 1):
+        state = {"x": columns["position_m"][i], "vx": columns["velocity_m_s"][i]}
+        reading = belief.update(state, None if 41 <= i <= 50 else columns["reward"][i])
+    assert all(np.array_equal(mean, run.latent[39]) for mean in run.latent[40:50])
+    np.testing.assert_allclose(run.latent[-1], reading.latent.mean, atol=1e-3)
+    whole = believed(**columns)
+    np.testing.assert_array_equal(run.latent[:40], whole.latent[:40])
+    assert run.readings[-1].family == whole.readings[-1].family == "velocity"
+
+
+def test_the_table_is_empty_where_nothing_was_heard(module, episodes, write, tmp_path):
+    damaged = {name: np.delete(values, np.r_[11:20]) for name, values in columns_of(episodes).items()}
+    fields = module.contract.fields
+    run = believe(module, resample(read_log(write(**damaged), fields, skip_bad_rows=True), fields))
+    save_beliefs(run, tmp_path / "belief.csv")
+    with (tmp_path / "belief.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for row, is_heard in ((rows[9], True), (rows[10], False), (rows[19], False), (rows[20], True)):
+        assert all((row[name] != "") == is_heard for name in ("position_m", "velocity_m_s", "reward"))
+        assert row["inferred_family"]

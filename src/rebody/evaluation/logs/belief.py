@@ -1,6 +1,7 @@
 """What a frozen module believes over a logged run."""
 
 import csv
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,12 @@ class BeliefOverTime:
     inference: str
     decisions: Decisions
     readings: list[Reading]
+    believed: int
+    """In how many decisions a reward was heard and believed."""
+    doubts: tuple[str, ...] = ()
+    """About rewards that no task could have paid."""
+    notes: tuple[str, ...] = ()
+    """About rewards that no task in the module's ranges would have paid."""
 
     @property
     def time_s(self) -> Float[np.ndarray, " decision"]:
@@ -55,6 +62,8 @@ class BeliefOverTime:
 
     def conclusion(self) -> str:
         """What is believed at the end, and since when."""
+        if not self.believed:
+            return "believes nothing: there was no reward that it could believe"
         last = self.readings[-1]
         family = FAMILIES[family_index(last.family)]
         is_same = self.believes(last.family)
@@ -73,17 +82,21 @@ class BeliefOverTime:
 
 
 def believe(inference: Inference, decisions: Decisions) -> BeliefOverTime:
-    """Let a module hear a run, decision by decision."""
+    """Let a module hear a run, decision by decision; where there is no reward, nothing was heard."""
     states = [dict(zip(decisions.fields, at, strict=True)) for at in zip(*decisions.fields.values(), strict=True)]
     belief = inference.begin(states[0])
-    readings = [belief.update(*heard) for heard in zip(states[1:], decisions.reward, strict=True)]
-    return BeliefOverTime(inference.name, decisions, readings)
+    rewards = [None if math.isnan(reward) else float(reward) for reward in decisions.reward]
+    readings = [belief.update(*heard) for heard in zip(states[1:], rewards, strict=True)]
+    doubts, notes = belief.doubts(math.inf), belief.notes(math.inf)
+    return BeliefOverTime(inference.name, decisions, readings, belief.believed, doubts, notes)
 
 
 def save_beliefs(run: BeliefOverTime, path: Path) -> None:
-    """A CSV with a row per decision: what was heard, then what was believed."""
+    """A CSV with a row per decision: what was heard, empty where that is nothing, then what was believed."""
     decisions = run.decisions
-    heard = {COLUMNS[field]: values[1:] for field, values in decisions.fields.items()} | {REWARD: decisions.reward}
+    states = {COLUMNS[field]: values[1:] for field, values in decisions.fields.items()}
+    unheard = np.isnan(decisions.reward)
+    heard = {name: np.where(unheard, np.nan, values) for name, values in (states | {REWARD: decisions.reward}).items()}
     with written_whole(path) as unfinished, unfinished.open("w", newline="") as file:
         rows = [
             {TIME: run.time_s[i]} | {name: values[i] for name, values in heard.items()} | _row(reading)
@@ -105,4 +118,6 @@ def _row(reading: Reading) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    return value if isinstance(value, str) else round(float(value), 6)
+    if isinstance(value, str):
+        return value
+    return "" if math.isnan(value) else round(float(value), 6)

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from rebody.evaluation.logs.file import Log, decisions_within
+from rebody.evaluation.logs.file import Log
+from rebody.evaluation.logs.ticks import heard, ticks_of
 from rebody.types import DECISION_DT, RATE_OF
 
 
@@ -15,25 +16,29 @@ class Decisions:
 
     time_s: Float[np.ndarray, " decision_and_one"]
     fields: dict[str, Float[np.ndarray, " decision_and_one"]]
-    """Of the global state; a pitch is not wrapped."""
+    """Of the global state; a pitch is not wrapped. Within gaps of the log they are guesses."""
     reward: Float[np.ndarray, " decision"]
+    """NaN where nothing was heard: a gap of the log reaches into the decision."""
 
 
 def resample(log: Log, fields: tuple[str, ...]) -> Decisions:
     """A log at ticks of 0.1 s from its first row on.
 
     Positions are interpolated, velocities are displacements between ticks, and rewards, which the steps to the rows
-    were paid, are averaged over each decision.
+    were paid, are averaged over each decision. In gaps, where displacements say nothing, velocities are those logged:
+    the one at the end of a gap is what the next decision begins with.
     """
-    ticks = log.time_s[0] + DECISION_DT * np.arange(decisions_within(log.time_s) + 1)
+    ticks, is_heard = ticks_of(log.time_s), heard(log.time_s)
     positions = {name: at_ticks(log, name, ticks) for name in log.fields if name not in RATE_OF}
     rates = {}
     for rate in (name for name in log.fields if name in RATE_OF):
-        position = positions.get(RATE_OF[rate])
-        moved = mean_logged(log, rate, ticks) if position is None else np.diff(position) / DECISION_DT
+        moved, position = mean_logged(log, rate, ticks), positions.get(RATE_OF[rate])
+        if position is not None:
+            moved = np.where(is_heard, np.diff(position) / DECISION_DT, moved)
         rates[rate] = np.concatenate([log.fields[rate][:1], moved])
     at = positions | rates
-    return Decisions(ticks, {name: at[name] for name in fields}, _means(log, log.reward, ticks))
+    reward = np.where(is_heard, _means(log, log.reward, ticks), np.nan)
+    return Decisions(ticks, {name: at[name] for name in fields}, reward)
 
 
 def at_ticks(log: Log, position: str, ticks: Float[np.ndarray, " tick"]) -> Float[np.ndarray, " tick"]:

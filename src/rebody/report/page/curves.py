@@ -1,19 +1,17 @@
 """Learning curves: which columns of a training log are drawn together, and in which unit."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import cycle
 
 import numpy as np
-from jaxtyping import Float
 from markupsafe import Markup
 from matplotlib.axes import Axes
 
 from rebody.report.page.drawing import CURVES, panel
+from rebody.report.page.log import LARGEST, Log
+from rebody.report.style import as_text
 from rebody.tasks import FAMILIES
-
-Log = Mapping[str, Float[np.ndarray, " iteration"]]
 
 SPARSE = 0.25
 """What is measured in a smaller share of iterations is drawn with dots."""
@@ -133,23 +131,41 @@ _KNOWN = {*LEFT_OUT, *(column for each in PANELS for column in each.columns)}
 
 def learning_curves(log: Log) -> dict[str, Markup]:
     """A figure per panel of which the log has a column, by title; columns that no panel knows get one each."""
-    unknown = (Panel(name, name, {name: name}) for name in log if name not in _KNOWN)
-    drawn = [each for each in (*PANELS, *unknown) if any(_measured(log, column) for column in each.columns)]
-    return {each.title: panel(partial(_draw, each, log)) for each in drawn}
+    of_name = {f"column {name}": _plain(name) for name in log if name not in _KNOWN}
+    panels = {each.title: each for each in PANELS} | of_name
+    return {
+        title: panel(partial(_draw, each, log))
+        for title, each in panels.items()
+        if any(_measured(log, column, each.scale) for column in each.columns)
+    }
+
+
+def _plain(name: str) -> Panel:
+    return Panel(as_text(f"column {name}"), as_text(name), {name: as_text(name)})
 
 
 def _draw(each: Panel, log: Log, axes: Axes) -> None:
-    colours = cycle(CURVES)
+    colours, iteration = cycle(CURVES), log["iteration"]
     for column, label in each.columns.items():
-        if _measured(log, column):
-            there = np.isfinite(log[column])
-            style = "o-" if there.mean() < SPARSE else "-"
-            points = log["iteration"][there], log[column][there]
+        there = _there(log, column, each.scale)
+        if there.any():
+            style = "o-" if there.mean() < SPARSE or there.sum() == 1 else "-"
+            points = iteration[there], log[column][there]
             axes.plot(*points, style, ms=3.5, lw=1.3, color=next(colours), label=label)
-    axes.set(title=each.title, xlabel="iteration", xlim=(0, 1.02 * log["iteration"][-1]))
+    begin = min(0.0, iteration[0])
+    axes.set(title=each.title, xlabel="iteration")
+    axes.set(xlim=(begin, begin + 1.02 * (iteration[-1] - begin or 1.0)))
     axes.set(ylabel=each.axis, yscale=each.scale, ylim=each.limits)
-    axes.legend(frameon=False, fontsize=8)
+    if list(each.columns.values()) != [each.axis]:  # which says it already
+        axes.legend(frameon=False, fontsize=8)
 
 
-def _measured(log: Log, column: str) -> bool:
-    return column in log and bool(np.isfinite(log[column]).any())
+def _there(log: Log, column: str, scale: str) -> np.ndarray:
+    """Which rows of a column can be drawn on that scale."""
+    if column not in log:
+        return np.zeros(1, bool)
+    return np.isfinite(log[column]) if scale == "linear" else log[column] > 1 / LARGEST
+
+
+def _measured(log: Log, column: str, scale: str) -> bool:
+    return bool(_there(log, column, scale).any())

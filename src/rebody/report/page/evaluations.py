@@ -13,6 +13,9 @@ from rebody.report.figures import draw_beliefs, draw_errors, draw_readings, draw
 from rebody.report.page.drawing import CURVES, panel
 from rebody.tasks import FAMILIES, Family
 
+KIND = "kind of task"
+"""The figure of latents."""
+
 
 def settings_of(results: Results) -> dict[str, Any]:
     """Who was put to the test, and where."""
@@ -25,15 +28,14 @@ def settings_of(results: Results) -> dict[str, Any]:
 
 
 def figures_of(results: Results) -> dict[str, Markup]:
-    """What the robot did, family by family, and what was believed in the end."""
+    """What the robot did, family by family, and what was believed in the end, if its latents fit together."""
     motion = {
         f"what the robot did: {name}": panel(partial(draw_trajectories, episodes=results.of(name)))
         for name in results.families
     }
-    return motion | {
-        "kind of task": panel(partial(draw_beliefs, results=results)),
-        "target": panel(partial(draw_readings, results=results)),
-    }
+    lengths = {len(latent) for episode in results.episodes for latent in episode.latent}
+    kind = {KIND: panel(partial(draw_beliefs, results=results))} if len(lengths) == 1 and lengths != {0} else {}
+    return motion | kind | {"target": panel(partial(draw_readings, results=results))}
 
 
 def legend(compared: Iterable[str]) -> dict[str, tuple[str, str]]:

@@ -4,15 +4,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from jaxtyping import Float
-
 from rebody.errors import RebodyError
 from rebody.evaluation.reading import holds_results, read_results
 from rebody.evaluation.results import Results
+from rebody.report.page import log as log_file
+from rebody.report.page.log import Log
 from rebody.store import load_artifact, read_meta, shipped_artifacts
 from rebody.store.artifact import HASHED, MANIFEST, WEIGHTS
-from rebody.training.run import read_log
+from rebody.store.checkpoint import FOLDER
+from rebody.store.files import DATA, check_file
 
 PICTURES, VIDEOS = (".png", ".svg"), (".mp4",)
 EXPECTED = (
@@ -30,8 +30,9 @@ class Training:
     settings: dict[str, Any]
     card: str | None
     """Markdown; None as long as the run is not finished."""
-    log: dict[str, Float[np.ndarray, " iteration"]]
-    """A column per measurement, NaN where nothing was measured."""
+    log: Log
+    notes: list[str]
+    """What of it cannot be shown."""
 
     @property
     def iterations(self) -> int:
@@ -62,7 +63,7 @@ def find(reference: str) -> Found:
         return Found(reference, "shipped with rebody", _training(shipped.path), {}, [], [], [])
     if path.is_dir():
         return _in_folder(path)
-    if path.is_file():
+    if path.exists():
         if not holds_results(path):
             raise RebodyError(f"{path} holds no results of an evaluation. {EXPECTED}")
         return Found(path.name, reference, None, {path: read_results(path)}, [], [], [])
@@ -72,14 +73,17 @@ def find(reference: str) -> Found:
 def _in_folder(folder: Path) -> Found:
     files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
     jsons = [path for path in files if path.suffix == ".json" and path.name not in (*HASHED, MANIFEST)]
-    results = {path: read_results(path) for path in jsons if holds_results(path)}
+    results = {path: read_results(path, folder) for path in jsons if holds_results(path, folder)}
+    pictures, videos = ([path for path in files if path.suffix.lower() in kind] for kind in (PICTURES, VIDEOS))
+    for path in (*pictures, *videos):
+        check_file(path, DATA, folder)
     found = Found(
         name=folder.resolve().name,
         place=str(folder),
         training=_training(folder),
         results=results,
-        pictures=[path for path in files if path.suffix.lower() in PICTURES],
-        videos=[path for path in files if path.suffix.lower() in VIDEOS],
+        pictures=pictures,
+        videos=videos,
         skipped=[path.name for path in jsons if path not in results],
     )
     if not (found.training or found.results or found.pictures or found.videos):
@@ -91,11 +95,10 @@ def _training(folder: Path) -> Training | None:
     """The artifact that a run left behind, else what its last checkpoint says of it."""
     if (folder / MANIFEST).exists() or (folder / WEIGHTS).exists():
         artifact = load_artifact(folder)
-        return Training(artifact.kind, artifact.config, artifact.card, read_log(artifact.log))
-    meta = read_meta(folder / "checkpoint")
+        log, notes = log_file.read_csv(artifact.log)
+        return Training(artifact.kind, artifact.config, artifact.card, log, notes)
+    meta = read_meta(folder / FOLDER)
     if meta is None:
         return None
-    names = dict.fromkeys(name for measured in meta["history"] for name in measured)
-    log = {name: np.array([measured.get(name, np.nan) for measured in meta["history"]]) for name in names}
-    iteration = np.arange(1.0, len(meta["history"]) + 1)
-    return Training("not finished", meta["settings"], None, {"iteration": iteration} | log)
+    settings, log, notes = log_file.read_meta(meta)
+    return Training("not finished", settings, None, log, notes)

@@ -18,10 +18,10 @@ from rebody.evaluation.tables import summary_table
 from rebody.report.diagnosis import plot_diagnosis
 from rebody.report.page.curves import learning_curves
 from rebody.report.page.drawing import COLOURS, inline
-from rebody.report.page.evaluations import errors_of, figures_of, legend, settings_of
+from rebody.report.page.evaluations import KIND, errors_of, figures_of, legend, settings_of
 from rebody.report.page.find import Found
 from rebody.report.page.tables import episodes_table, from_terminal
-from rebody.store.files import written_whole
+from rebody.store.files import DATA, read_file, written_whole
 from rebody.training.card import command_line, versions
 
 CARD_HEADINGS_FROM = 3
@@ -38,7 +38,7 @@ def write_page(found: Sequence[Found], path: Path) -> None:
         made=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
     )  # fmt: skip
     with written_whole(path) as unfinished:
-        unfinished.write_text(page, encoding="utf-8")
+        unfinished.write_text(page, encoding="utf-8", errors="replace")  # names of files may hold any bytes
 
 
 def _environment() -> Environment:
@@ -56,6 +56,7 @@ def _environment() -> Environment:
         "summary": lambda results: from_terminal(summary_table([results]), ["", "value"]),
         "summaries": lambda compared: from_terminal(summary_table(list(compared.values())), ["", *compared]),
         "figures_of": figures_of,
+        "kind": KIND,
         "legend": legend,
         "colours": COLOURS,
         "errors_of": errors_of,
@@ -100,4 +101,4 @@ def card_to_html(card: str) -> Markup:
 def data_uri(path: Path) -> str:
     """A file's content in place of its address."""
     kind, _ = mimetypes.guess_type(path.name)
-    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
+    return f"data:{kind};base64,{base64.b64encode(read_file(path, DATA)).decode()}"

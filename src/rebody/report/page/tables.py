@@ -54,7 +54,10 @@ def _task(episode: EpisodeResult) -> str:
     text = f"{episode.family} {episode.target:+.3g}"
     if episode.switch is None:
         return text
-    return f"{text}, from {episode.switch['at_s']:g} s {episode.switch['family']} {episode.switch['target']:+.3g}"
+    at_s, family, target = (episode.switch.get(name) for name in ("at_s", "family", "target"))
+    if not (isinstance(at_s, float | int) and isinstance(target, float | int)):
+        return f"{text}, then {episode.active_family[-1]} {episode.active_target[-1]:+.3g}"
+    return f"{text}, from {at_s:g} s {family} {target:+.3g}"
 
 
 def _plain(cell: object) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from rebody import names
 from rebody.errors import RebodyError
 from rebody.report.thesis import balancing, retrained, zero_shot
 from rebody.report.thesis import first_experiment as first
@@ -18,7 +19,6 @@ class ThesisFigure:
     """One figure of the thesis."""
 
     number: str
-    title: str
     shipped: Callable[[], Data]
     """Its log out of the package."""
     rerun: Callable[[Path], Data]
@@ -28,11 +28,15 @@ class ThesisFigure:
     caption: str
     """What is seen."""
 
+    @property
+    def title(self) -> str:
+        """As `rebody list` has it."""
+        return names.FIGURES[self.number]
+
 
 def _positions(number: str, robot: str) -> ThesisFigure:
     return ThesisFigure(
         number,
-        f"hidden positions on the {robot}",
         shipped(number),
         lambda _: balancing.positions_on(robot),
         balancing.draw_both,
@@ -45,7 +49,6 @@ def _positions(number: str, robot: str) -> ThesisFigure:
 def _zero_shot(number: str, robot: str) -> ThesisFigure:
     return ThesisFigure(
         number,
-        f"goals and speeds on the {robot}, zero-shot",
         shipped(number),
         lambda _: zero_shot.with_latents(robot),
         zero_shot.draw_robot,
@@ -60,7 +63,6 @@ FIGURES = {
     for figure in (
         ThesisFigure(
             "6.1",
-            "the toy in MuJoCo, and the forces on it",
             shipped("6.1"),
             first.toy_picture,
             first.draw_toy,
@@ -69,7 +71,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.2",
-            "return during training on the toy",
             first.toy_training_log,
             first.train_toy,
             first.draw_toy_training,
@@ -79,7 +80,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.3",
-            "the trained module on the toy",
             shipped("6.3"),
             lambda _: first.on_toy(),
             first.draw_episodes,
@@ -89,7 +89,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.5",
-            "a flat policy on the cheetah: trajectories",
             shipped("6.5"),
             lambda _: first.flat_on_cheetah(),
             first.draw_episodes,
@@ -100,7 +99,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.6",
-            "a flat policy on the cheetah: training",
             first.flat_training_log,
             first.train_flat_again,
             first.draw_flat_training,
@@ -109,7 +107,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.7",
-            "the cheetah's tracker: training",
             lambda: first.tracker_training_log("cheetah"),
             lambda runs: first.train_tracker_again("cheetah", runs),
             first.draw_tracker_training,
@@ -118,7 +115,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.8",
-            "the naive transfer to the cheetah: a decision at every control step",
             shipped("6.8"),
             lambda _: first.thesis_on_cheetah(1),
             first.draw_transfer,
@@ -128,7 +124,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.9",
-            "striding on the cheetah",
             shipped("6.9"),
             lambda _: first.strides_on_cheetah(),
             first.draw_strides,
@@ -141,7 +136,6 @@ FIGURES = {
         _positions("6.11", "walker"),
         ThesisFigure(
             "6.12",
-            "trackers of robots that have to balance: training",
             balancing.tracker_logs,
             balancing.train_trackers_again,
             balancing.draw_trackers,
@@ -150,7 +144,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.13",
-            "return during training on goals and speeds",
             several.training,
             several.train_again,
             several.draw_training,
@@ -161,7 +154,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.14a",
-            "the toy on goals and speeds",
             shipped("6.14a"),
             lambda _: several.on_toy(),
             several.draw_ways,
@@ -170,7 +162,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.14b",
-            "latents of goals and speeds in two dimensions",
             shipped("6.14b"),
             lambda _: several.projections(),
             several.draw_projections,
@@ -179,7 +170,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.15",
-            "goals and speeds on the cheetah, by what disturbed the toy in training",
             shipped("6.15"),
             lambda _: zero_shot.randomised(),
             zero_shot.draw_randomised,
@@ -192,7 +182,6 @@ FIGURES = {
         _zero_shot("6.18", "hopper"),
         ThesisFigure(
             "6.19",
-            "high levels learned on robots: training",
             retrained.training,
             retrained.train_again,
             retrained.draw_training,
@@ -201,7 +190,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.20",
-            "high levels learned on the cheetah: goals and speeds",
             shipped("6.20"),
             lambda _: retrained.on_robots(retrained.ON_CHEETAH),
             partial(retrained.draw_ways, retrained.ON_CHEETAH),
@@ -210,7 +198,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.21",
-            "high levels learned on walker and hopper: goals and speeds",
             shipped("6.21"),
             lambda _: retrained.on_robots(retrained.BALANCING),
             partial(retrained.draw_ways, retrained.BALANCING),
@@ -219,7 +206,6 @@ FIGURES = {
         ),
         ThesisFigure(
             "6.22",
-            "a high level learned on the cheetah: goals, speeds and stands",
             shipped("6.22"),
             lambda _: retrained.standing(),
             retrained.draw_standing,

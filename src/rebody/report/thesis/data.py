@@ -8,6 +8,7 @@ import safetensors.numpy
 
 from rebody.evaluation.evaluate import Trial, check_trial, run_trial, trial_agent
 from rebody.store import load_artifact
+from rebody.store.files import written_whole
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.training.run import read_log
 from rebody.types import DECISION_DT
@@ -26,7 +27,8 @@ def shipped(number: str) -> Callable[[], Data]:
 
 def save(data: Data, path: Path) -> None:
     """Write a log."""
-    safetensors.numpy.save_file({name: np.array(array, order="C") for name, array in data.items()}, path)
+    with written_whole(path) as unfinished:
+        safetensors.numpy.save_file({name: np.array(array, order="C") for name, array in data.items()}, unfinished)
 
 
 def training_log(artifact: str | Path, kind: str) -> Data:

@@ -37,7 +37,7 @@ def save_slots(
         "families": classifier.families,
         "hidden": config.hidden,
         "components": len(slots),
-        "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
+        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
     }
     rows = {}
     for name, chooser in choosers.items():

@@ -13,7 +13,9 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from rebody.agents.parts import Inference, load_inference
 from rebody.agents.slots import SlotClassifier
 from rebody.errors import RebodyError
+from rebody.jax_settings import own_jax_settings
 from rebody.nn import MLP
+from rebody.ranges import check_ranges
 from rebody.store import load_artifact
 from rebody.training.classifier.config import ClassifierConfig
 from rebody.training.classifier.data import ToyWorld, act
@@ -37,20 +39,24 @@ class Beliefs(eqx.Module):
     family: Int[AnyArray, " belief"]
 
 
-def train_classifier(inference: str, config: ClassifierConfig, out: Path, seed: int, *, resume: bool = False) -> Path:
+@own_jax_settings()
+def train_classifier(
+    inference: str, config: ClassifierConfig, out: Path, seed: int, *, resume: bool = False, finish: bool = False
+) -> Path:
     """Train a classifier and find the slots of the mixture's components; returns the artifact's folder.
 
     RebodyError if `out` holds another run, or the module knows one family only; Interrupted on Ctrl-C.
     """
+    check_ranges(config)
     module = load_inference(inference)
     if len(module.contract.families) < 2:
         raise RebodyError(f"'{module.name}' knows one family only: there is no slot to choose.")
-    run = Run(out, asdict(config) | {"inference": inference, "seed": seed}, resume=resume)
-    world, key = ToyWorld.of(load_artifact(inference, "inference").config["training"]), jax.random.key(seed)
-    seen = listen(module, world, config, jax.random.fold_in(key, 2**31 - 1))
-    state = run.restore(initial_state(module, config, key))
-    state = run.loop(state, lambda state: iterate(state, seen, config, key), config.iterations, "classifier")
-    return save_slots(state.classifier, module, world, config, run, seed)
+    with Run(out, asdict(config) | {"inference": inference, "seed": seed}, resume=resume, finish=finish) as run:
+        world, key = ToyWorld.of(load_artifact(inference, "inference").config["training"]), jax.random.key(seed)
+        seen = listen(module, world, config, jax.random.fold_in(key, 2**31 - 1))
+        state = run.restore(initial_state(module, config, key))
+        state = run.loop(state, lambda state: iterate(state, seen, config, key), config.iterations, "classifier")
+        return save_slots(state.classifier, module, world, config, run, seed)
 
 
 def iterate(state: RunState, seen: Beliefs, config: ClassifierConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
@@ -106,4 +112,5 @@ def cross_entropy(classifier: SlotClassifier, seen: Beliefs) -> Float[Array, ""]
 
 
 def _optimiser(config: ClassifierConfig) -> optax.GradientTransformation:
+    # a run that is resumed with another length goes on along the new cosine from where its count of updates is
     return optax.adam(optax.cosine_decay_schedule(config.learning_rate, config.updates * config.iterations, alpha=0.05))

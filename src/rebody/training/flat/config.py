@@ -4,23 +4,24 @@ from dataclasses import dataclass, field
 
 from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
+from rebody.ranges import Copies, Count, Decisions, Number, Rows
 
 
 @dataclass(frozen=True)
 class FlatConfig:
     """One training run of a flat policy; robots, steps and updates are a tracker's."""
 
-    robots: int = 64
+    robots: Copies = 64
     """Copies that move in parallel."""
-    steps: int = 32
+    steps: Copies = 32
     """Control steps of each robot in an iteration."""
-    updates: int = 256
+    updates: Count = 256
     """Updates in an iteration."""
-    iterations: int = 700
+    iterations: Number = 700
     """Length of the run."""
-    replay: int = 500_000
+    replay: Rows = 500_000
     """Transitions kept."""
-    decisions: int = 200
+    decisions: Decisions = 200
     """Length of an episode: 20 s, as long as it will be used."""
     reward: TrackerReward = field(default_factory=TrackerReward)
     """What the policy is paid: as a tracker that is told the hidden task."""

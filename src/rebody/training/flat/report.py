@@ -42,14 +42,14 @@ def save_flat(policy: FlatPolicy, module: Inference, spec: RobotSpec, config: Fl
         "actions": actor.actions,
         "hidden": config.sac.hidden,
         "projections": config.sac.projections,
-        "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
+        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
     }
     condition = f"{TASKS} held-out tasks, 20 s"
     rows = rows_of(figures, condition)
-    steps = config.iterations * config.steps * config.robots
+    steps = run.iterations * config.steps * config.robots
     what = (
         f"Flat policy of '{spec.name}': (joint state, x, belief of '{module.name}') -> joint action, without "
-        f"subgoals. Trained on {steps:,} control steps with {config.iterations * config.updates:,} updates."
+        f"subgoals. Trained on {steps:,} control steps with {run.iterations * config.updates:,} updates."
     )
     text = card(f"Flat policy: {spec.name}", what, run, seed, rows)
     return save_artifact(run.out, kind="flat", config=stored, weights=policy, card=text, log=run.log)

@@ -19,6 +19,8 @@ from rebody.control.flat import FlatPolicy, FlatView
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.tracker import slots_of
 from rebody.errors import RebodyError
+from rebody.jax_settings import own_jax_settings
+from rebody.ranges import check_ranges
 from rebody.training.flat.config import FlatConfig
 from rebody.training.flat.report import measure, save_flat
 from rebody.training.minds import Minds, listen, new_minds, put_on_feet
@@ -42,6 +44,7 @@ class RunState(eqx.Module):
     iteration: Int[np.ndarray, ""]
 
 
+@own_jax_settings()
 def train_flat(
     robot: str,
     inference: str,
@@ -50,24 +53,26 @@ def train_flat(
     seed: int,
     *,
     resume: bool = False,
+    finish: bool = False,
     init_from: str | None = None,
 ) -> Path:
     """Train a flat policy; returns the artifact's folder.
 
     RebodyError if `out` holds another run, or module and robot do not fit; Interrupted on Ctrl-C.
     """
+    check_ranges(config)
     spec, module = load_robot(robot), load_inference(inference)
     if config.steps < spec.steps_per_decision:
         raise RebodyError(f"--steps must be at least the {spec.steps_per_decision} control steps of a decision.")
     module.contract.check_body(spec.name, spec.moving_fields, slots_of(spec.reach))
     settings = {"robot": robot, "inference": inference, "seed": seed, "init_from": init_from}
-    run = Run(out, asdict(config) | settings, resume=resume)
-    batch = RobotBatch(spec, config.robots)
-    batch.reset(np.random.default_rng((seed, 1)))
-    state = run.restore(initial_state(config, batch, module, jax.random.key(seed), init_from))
-    batch.state = state.physics
-    state = run.loop(state, lambda state: iterate(state, batch, module, config, seed), config.iterations, "flat")
-    return save_flat(flat_policy(state, module), module, spec, config, run, seed)
+    with Run(out, asdict(config) | settings, resume=resume, finish=finish) as run:
+        batch = RobotBatch(spec, config.robots)
+        batch.reset(np.random.default_rng((seed, 1)))
+        state = run.restore(initial_state(config, batch, module, jax.random.key(seed), init_from))
+        batch.state = state.physics
+        state = run.loop(state, lambda state: iterate(state, batch, module, config, seed), config.iterations, "flat")
+        return save_flat(flat_policy(state, module), module, spec, config, run, seed)
 
 
 def iterate(

@@ -4,29 +4,30 @@ from dataclasses import dataclass, field, replace
 
 from rebody.control.high_level import high_level_sac
 from rebody.control.sac import SACConfig
+from rebody.ranges import Copies, Count, Decisions, NotNegative, Number, Positive, Rows
 
 
 @dataclass(frozen=True)
 class HighLevelConfig:
     """One training run of a high-level policy."""
 
-    robots: int = 64
+    robots: Copies = 64
     """Copies that move in parallel."""
-    steps: int = 25
+    steps: Copies = 25
     """Decisions of each robot in an iteration."""
-    updates: int = 512
+    updates: Count = 512
     """Updates in an iteration."""
-    iterations: int = 320
+    iterations: Number = 320
     """Length of the run."""
-    replay: int = 512_000
+    replay: Rows = 512_000
     """Decisions kept: all of the run. Without its first ones, which tried everything, it gets worse again."""
-    decisions: int = 100
+    decisions: Decisions = 100
     """Length of an episode: 10 s."""
-    arrival: float = 0.3
+    arrival: NotNegative = 0.3
     """Added to the scaled reward r of a decision when r = 0: it pulls the last centimetres, and pays for a jump."""
-    arrival_width: float = 0.1
+    arrival_width: Positive = 0.1
     """Half of it is added at r = -arrival_width."""
-    fall: float = 5.0
+    fall: NotNegative = 5.0
     """Taken from the reward of a decision in which the robot fell."""
     # with -1 in place of -2 nats values stay so uncertain that speeds are missed by three times as much
     sac: SACConfig = field(

@@ -50,14 +50,14 @@ def save_high_level(
         "observations": actor.observations,
         "hidden": config.sac.hidden,
         "projections": config.sac.projections,
-        "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
+        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
     }
     rows = rows_of(figures, f"{TASKS} held-out tasks, 20 s")
-    decisions = config.iterations * config.steps * config.robots
+    decisions = run.iterations * config.steps * config.robots
     what = (
         f"High-level policy of '{spec.name}': (global state, belief of '{module.name}') -> subgoal of "
         f"'{tracker.name}'. Trained on {decisions:,} decisions, which are {decisions * spec.steps_per_decision:,} "
-        f"control steps, with {config.iterations * config.updates:,} updates; module and tracker are frozen."
+        f"control steps, with {run.iterations * config.updates:,} updates; module and tracker are frozen."
     )
     text = card(f"High-level policy: {spec.name}", what, run, seed, rows)
     return save_artifact(run.out, kind="high-level", config=stored, weights=policy, card=text, log=run.log)

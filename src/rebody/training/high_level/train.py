@@ -20,6 +20,8 @@ from rebody.bodies import RobotBatch, RobotSpec, load_robot
 from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.slot_policy import SlotPolicy, Slots, draw, judge, slot_sac, slots_within, subgoal_of
+from rebody.jax_settings import own_jax_settings
+from rebody.ranges import check_ranges
 from rebody.training.arrival import arrival_bonus
 from rebody.training.high_level.config import HighLevelConfig
 from rebody.training.high_level.report import measure, save_high_level
@@ -52,6 +54,7 @@ class RunState(eqx.Module):
     iteration: Int[np.ndarray, ""]
 
 
+@own_jax_settings()
 def train_high_level(
     robot: str,
     inference: str,
@@ -61,24 +64,28 @@ def train_high_level(
     seed: int,
     *,
     resume: bool = False,
+    finish: bool = False,
     init_from: str | None = None,
 ) -> Path:
     """Train a high-level policy for a tracker, by default `tracker-ROBOT`; returns the artifact's folder.
 
     RebodyError if `out` holds another run, or module, tracker and robot do not fit; Interrupted on Ctrl-C.
     """
+    check_ranges(config)
     spec, module = load_robot(robot), load_inference(inference)
     loaded = load_tracker(tracker or f"tracker-{spec.name}")
     check_robot_of(loaded, spec)
     module.contract.check_body(spec.name, spec.moving_fields, loaded.tracker.slots)
     settings = {"robot": robot, "inference": inference, "tracker": tracker, "seed": seed, "init_from": init_from}
-    run = Run(out, asdict(config) | settings, resume=resume)
-    batch, frozen = RobotBatch(spec, config.robots), freeze(module, loaded, spec)
-    batch.reset(np.random.default_rng((seed, 1)))
-    state = run.restore(initial_state(config, batch, frozen, jax.random.key(seed), init_from))
-    batch.state = state.physics
-    state = run.loop(state, lambda state: iterate(state, batch, frozen, config, seed), config.iterations, "high level")
-    return save_high_level(slot_policy(state, frozen), module, loaded, spec, config, run, seed)
+    with Run(out, asdict(config) | settings, resume=resume, finish=finish) as run:
+        batch, frozen = RobotBatch(spec, config.robots), freeze(module, loaded, spec)
+        batch.reset(np.random.default_rng((seed, 1)))
+        state = run.restore(initial_state(config, batch, frozen, jax.random.key(seed), init_from))
+        batch.state = state.physics
+        state = run.loop(
+            state, lambda state: iterate(state, batch, frozen, config, seed), config.iterations, "high level"
+        )
+        return save_high_level(slot_policy(state, frozen), module, loaded, spec, config, run, seed)
 
 
 def iterate(

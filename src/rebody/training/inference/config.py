@@ -9,6 +9,7 @@ from rebody.control.high_level import PolicyView
 from rebody.control.sac import SACConfig
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
+from rebody.ranges import Copies, Count, Decisions, NotNegative, Number, Positive, Share
 from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
 
 
@@ -18,19 +19,19 @@ class MixtureConfig:
 
     covariance_type: Literal["full", "diag"] = "full"
     """Whether components may lie aslant."""
-    concentration: float = 5.0
+    concentration: Positive = 5.0
     """gamma of v_k ~ Beta(1, gamma)."""
-    prior_scale: float = 0.1
+    prior_scale: Positive = 0.1
     """Variance that the prior expects of a component in each dimension."""
-    components: int | None = None
+    components: Copies | None = None
     """A fixed number of components, for comparison; by default it is found."""
-    points: int = 2000
+    points: Count = 2000
     """Beliefs of a fit."""
-    from_decision: int = 10
+    from_decision: Number = 10
     """Beliefs are taken from this decision of an episode on, when something is known."""
-    from_iteration: int = 5
+    from_iteration: Number = 5
     """First iteration with a fit; before it the prior is N(0, I)."""
-    maximum: int = 32
+    maximum: Copies = 32
     """Components that the loss can take."""
 
 
@@ -48,7 +49,7 @@ class MetaConfig:
     """The high-level policy's learning."""
     policy_fields: tuple[str, ...]
     """Fields of the global state that the policies see, beside the places that a split latent speaks of."""
-    policy_scales: tuple[float, ...]
+    policy_scales: tuple[Positive, ...]
     """What each of them is divided by [m, m/s]."""
     prior: Literal["gaussian", "mixture"] = "gaussian"
     """What the latent is drawn towards: one Gaussian, or a Dirichlet process mixture."""
@@ -56,43 +57,43 @@ class MetaConfig:
     """Settings of the mixture."""
     toy: Literal["mass-damper", "position", "full"] = "mass-damper"
     """The body that everything is learned on."""
-    arrival: float = 0.0
+    arrival: NotNegative = 0.0
     """Added to the scaled reward r / reward_scale of the policy's learning when r = 0. It is a function of the reward
     alone, and pulls the last centimetres."""
-    arrival_width: float = 0.1
+    arrival_width: Positive = 0.1
     """Half of it is added at r = -arrival_width."""
     randomisation: Randomisation = field(default_factory=Randomisation)
     """Disturbances of half of the episodes."""
-    switch_share: float = 0.0
+    switch_share: Share = 0.0
     """Share of episodes in which the task changes once, at any decision."""
-    observation_noise: float = 0.0
+    observation_noise: NotNegative = 0.0
     """Variance of the noise on every observed field (thesis, captions of 6.20)."""
-    start: tuple[float, float] = (12.0, 3.0)
+    start: tuple[NotNegative, NotNegative] = (12.0, 3.0)
     """Episodes start at uniformly random x [m] and vx [m/s] within these, a full toy at any pitch that it can hold."""
-    disturbed_start: tuple[float, float] | None = None
+    disturbed_start: tuple[NotNegative, NotNegative] | None = None
     """The same for disturbed episodes, which teach inference alone; by default as the others."""
-    turn_probability: float = 0.15
+    turn_probability: Share = 0.15
     """Chance per decision that a wandering toy changes its mind. It must come to see goals from both sides: while it
     stays on one, a belief in their mirror image explains all that it hears."""
-    episodes: int = 48
+    episodes: Copies = 48
     """Toys that move in parallel: the first half nominal, the other disturbed."""
-    decisions: int = 200
+    decisions: Decisions = 200
     """Length of an episode: 20 s, as long as it will be used, so that nothing that comes late is new."""
-    groups: int = 8
+    groups: Copies = 8
     """Iterations whose episodes are kept for learning."""
-    wander_iterations: int = 12
+    wander_iterations: Number = 12
     """Iterations at the start in which all toys wander and only inference learns."""
-    joint_iterations: int = 38
+    joint_iterations: Number = 38
     """Iterations after that in which inference, the policy, and one that is told the task learn together."""
-    policy_iterations: int = 90
+    policy_iterations: Number = 90
     """Iterations after that in which inference is frozen and the policy learns on."""
-    inference_updates: int = 128
+    inference_updates: Number = 128
     """Updates of encoder and decoder in an iteration."""
-    policy_updates: int = 512
+    policy_updates: Number = 512
     """Updates of the policy in an iteration, and of the policy that is told the task in joint ones."""
 
     def __post_init__(self):
-        """RebodyError where a field has no scale, or a scale no field."""
+        """RebodyError where a field has no scale, a scale no field, or no window fits into an episode."""
         pairs = (
             ("--policy-scales", self.policy_fields, self.policy_scales),
             ("--inference.scales", self.inference.fields, self.inference.scales),
@@ -102,6 +103,11 @@ class MetaConfig:
                 raise RebodyError(
                     f"{option} must give a number for each of {', '.join(fields)}: {len(fields)}, not {len(scales)}."
                 )
+
+        if (self.inference.window or 1) > self.decisions:
+            raise RebodyError(
+                f"--inference.window {self.inference.window} is longer than --decisions {self.decisions}."
+            )
 
     @property
     def policy_view(self) -> PolicyView:

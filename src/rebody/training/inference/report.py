@@ -34,7 +34,7 @@ def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run
             "projections": config.sac.projections,
         },
         "toy": describe_toy(toy),
-        "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
+        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
     }
     units = {
         f"{family.name} {figure}": family.unit for family in FAMILIES for figure in ("median", "p95", "read, disturbed")
@@ -43,7 +43,7 @@ def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run
         f"{name}, {HELD_OUT} held-out tasks, 20 s on the toy": f"{value:.5g} {units.get(name, '')}".rstrip()
         for name, value in figures.items()
     }
-    steps = config.iterations * config.episodes * config.decisions
+    steps = run.iterations * config.episodes * config.decisions
     what = (
         f"Inference module (encoder, decoder, probe) and the toy's high-level policy, trained on a point mass "
         f"on {', '.join(contract.target_ranges)} tasks in {steps:,} toy steps. No robot took part."

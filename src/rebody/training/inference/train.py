@@ -24,6 +24,8 @@ from rebody.inference.mixture.padded import Clusters, clusters_of, no_clusters
 from rebody.inference.module import Evidence, InferenceModule, loss
 from rebody.inference.prior import Prior, SplitPrior, unit_gaussian
 from rebody.inference.probe import Probe
+from rebody.jax_settings import own_jax_settings
+from rebody.ranges import check_ranges
 from rebody.tasks import base_task
 from rebody.training.arrival import arrival_bonus
 from rebody.training.inference.clusters import refit
@@ -39,6 +41,8 @@ HELD_OUT = 200
 """Held-out tasks of an evaluation."""
 BEGINS_AT_START = 0.3
 """Share of windows that begin with their episode, when nothing is known: the first decisions count."""
+LENGTH = ("wander_iterations", "joint_iterations", "policy_iterations")
+"""Settings that say how long the parts of a run are, in their order."""
 
 
 class RunState(eqx.Module):
@@ -53,6 +57,7 @@ class RunState(eqx.Module):
     iteration: Int[Array, ""]
 
 
+@own_jax_settings()
 def train_inference(
     config: MetaConfig,
     out: Path,
@@ -60,17 +65,21 @@ def train_inference(
     *,
     title: str,
     resume: bool = False,
+    finish: bool = False,
     init_from: str | None = None,
 ) -> Path:
     """Train an inference module with its high-level policy; returns the artifact's folder.
 
     RebodyError if `out` holds another run, or `init_from` has other sizes; Interrupted on Ctrl-C.
     """
-    run = Run(out, asdict(config) | {"seed": seed, "init_from": init_from}, resume=resume)
-    toy, key = make_toy(config.toy), jax.random.key(seed)
-    state = run.restore(initial_state(config, toy, key, init_from))
-    state = run.loop(state, lambda state: iterate(state, toy, config, key), config.iterations, "inference")
-    return save_inference(trained_parts(state, config), toy, config, run, seed, title)
+    check_ranges(config)
+    with Run(
+        out, asdict(config) | {"seed": seed, "init_from": init_from}, length=LENGTH, resume=resume, finish=finish
+    ) as run:
+        toy, key = make_toy(config.toy), jax.random.key(seed)
+        state = run.restore(initial_state(config, toy, key, init_from))
+        state = run.loop(state, lambda state: iterate(state, toy, config, key), config.iterations, "inference")
+        return save_inference(trained_parts(state, config), toy, config, run, seed, title)
 
 
 def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
@@ -270,7 +279,10 @@ def _shaped(reward: Float[Array, " batch"], config: MetaConfig) -> Float[Array, 
 
 
 def optimiser_of(config: MetaConfig) -> optax.GradientTransformation:
-    """What moves encoder and decoder: ever smaller steps."""
+    """What moves encoder and decoder: ever smaller steps.
+
+    A run that is resumed with another length goes on along the new cosine from where its count of updates is.
+    """
     updates = max(1, config.inference_iterations * config.inference_updates)
     schedule = optax.cosine_decay_schedule(config.inference.learning_rate, updates, alpha=0.05)
     return optax.chain(optax.clip_by_global_norm(1.0), optax.adam(schedule))

@@ -8,6 +8,7 @@ from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
+from rebody.ranges import Copies, Decisions, NotNegative, Number, Share
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.presets import goal_velocity
 from rebody.training.minds import within_reach
@@ -17,23 +18,23 @@ from rebody.training.minds import within_reach
 class ScratchConfig:
     """One training run; the defaults spend the cheetah's control steps of a tracker and a high-level policy."""
 
-    robots: int = 32
+    robots: Copies = 32
     """Copies that move in parallel."""
-    decisions: int = 100
+    decisions: Decisions = 100
     """Length of an episode: 10 s."""
-    groups: int = 80
+    groups: Copies = 80
     """Iterations whose episodes are kept for learning."""
-    iterations: int = 512
+    iterations: Number = 512
     """Length of the run; an iteration is an episode of every robot."""
-    inference_updates: int = 64
+    inference_updates: Number = 64
     """Updates of encoder and decoder in an iteration."""
-    policy_updates: int = 384
+    policy_updates: Number = 384
     """Updates of the policy in an iteration."""
-    start: float = 15.0
+    start: NotNegative = 15.0
     """Episodes begin anywhere within this from x = 0 [m], so that the latent cannot take the start for the task."""
-    switch_share: float = 0.5
+    switch_share: Share = 0.5
     """Share of episodes in which the task changes once, as on the toy."""
-    told_share: float = 0.5
+    told_share: Share = 0.5
     """Share of robots that are told their task, and of control steps that the policy learns from as if it were. While
     nothing is known, a policy that only believes learns to stand still, and from that the module learns nothing."""
     inference: InferenceConfig = field(default_factory=lambda: goal_velocity().inference)

@@ -62,15 +62,15 @@ def save_scratch(
         "actions": actor.actions,
         "hidden": config.sac.hidden,
         "projections": config.sac.projections,
-        "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
+        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
     }
     rows = rows_of(figures, f"{TASKS} held-out tasks, 20 s")
-    decisions = config.iterations * config.robots * config.decisions
+    decisions = run.iterations * config.robots * config.decisions
     what = (
         f"Inference module and joint policy of '{spec.name}', learned together on the robot: nothing is reused. "
         f"Trained on {decisions * spec.steps_per_decision:,} control steps with "
-        f"{config.iterations * config.policy_updates:,} updates of the policy and "
-        f"{config.iterations * config.inference_updates:,} of the module."
+        f"{run.iterations * config.policy_updates:,} updates of the policy and "
+        f"{run.iterations * config.inference_updates:,} of the module."
     )
     text = card(f"From scratch: {spec.name}", what, run, seed, rows)
     return save_artifact(run.out, kind="scratch", config=stored, weights=parts, card=text, log=run.log)

@@ -24,6 +24,8 @@ from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.inference.module import InferenceModule
 from rebody.inference.prior import SplitPrior, unit_gaussian
 from rebody.inference.probe import Probe
+from rebody.jax_settings import own_jax_settings
+from rebody.ranges import check_ranges
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, refresh_beliefs
 from rebody.training.inference.train import optimiser_of, store, take_over, tell, update_inference
@@ -69,19 +71,30 @@ class RunState(eqx.Module):
     iteration: Int[Array, ""]
 
 
+@own_jax_settings()
 def train_scratch(
-    robot: str, config: ScratchConfig, out: Path, seed: int, *, resume: bool = False, init_from: str | None = None
+    robot: str,
+    config: ScratchConfig,
+    out: Path,
+    seed: int,
+    *,
+    resume: bool = False,
+    finish: bool = False,
+    init_from: str | None = None,
 ) -> Path:
     """Train module and policy; returns the artifact's folder.
 
     RebodyError if `out` holds another run, or `init_from` has other sizes; Interrupted on Ctrl-C.
     """
+    check_ranges(config)
     spec = load_robot(robot)
-    run = Run(out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume)
-    batch, meta = RobotBatch(spec, config.robots), config.meta(spec.reach)
-    state = run.restore(initial_state(config, meta, batch, jax.random.key(seed), init_from))
-    state = run.loop(state, lambda state: iterate(state, batch, config, meta, seed), config.iterations, "scratch")
-    return save_scratch(trained_parts(state, meta), spec, config, meta, run, seed)
+    with Run(
+        out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume, finish=finish
+    ) as run:
+        batch, meta = RobotBatch(spec, config.robots), config.meta(spec.reach)
+        state = run.restore(initial_state(config, meta, batch, jax.random.key(seed), init_from))
+        state = run.loop(state, lambda state: iterate(state, batch, config, meta, seed), config.iterations, "scratch")
+        return save_scratch(trained_parts(state, meta), spec, config, meta, run, seed)
 
 
 def iterate(

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from rebody.control.sac import SACConfig
+from rebody.ranges import Copies, Count, Number, Rows, Share
 from rebody.training.tracker.commands import CommandDistribution
 
 
@@ -10,17 +11,17 @@ from rebody.training.tracker.commands import CommandDistribution
 class StepPredictorConfig:
     """One training run of a step predictor."""
 
-    robots: int = 64
+    robots: Copies = 64
     """Copies that move in parallel."""
-    steps: int = 64
+    steps: Copies = 64
     """Control steps of each robot in an iteration; at least as many as a subgoal can last, 20."""
-    updates: int = 128
+    updates: Count = 128
     """Updates in an iteration."""
-    iterations: int = 60
+    iterations: Number = 60
     """Length of the run."""
-    replay: int = 200_000
+    replay: Rows = 200_000
     """Transitions kept; one is a subgoal, however long it was held."""
-    change_probability: float = 0.05
+    change_probability: Share = 0.05
     """Chance per subgoal that the task changes to which the toy leads its robot."""
     tasks: CommandDistribution = field(default_factory=CommandDistribution)
     """How those tasks are drawn: as a tracker's commands, goals and speeds alike."""

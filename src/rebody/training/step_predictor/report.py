@@ -68,17 +68,17 @@ def save_step_predictor(
         "observations": actor.observations,
         "hidden": config.sac.hidden,
         "projections": config.sac.projections,
-        "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
+        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
     }
     figures = measure(Deciding(actor), loaded.tracker, spec, config)
     rows = {f"{name}, predicted": f"{value:.3f}" for name, value in figures.items()}
     for stride in STRIDES:
         fixed = measure(Fixed(jnp.asarray(stride)), loaded.tracker, spec, config)
         rows |= {f"{name}, always {stride}": f"{fixed[name]:.3f}" for name in ("reward", "relative error")}
-    steps = config.iterations * config.steps * config.robots
+    steps = run.iterations * config.steps * config.robots
     what = (
         f"How many control steps a subgoal will take '{spec.name}' and '{loaded.name}': (joint state, subgoal) -> 1 to "
-        f"{MOST_STEPS}. Trained on {steps:,} control steps with {config.iterations * config.updates:,} updates. The "
+        f"{MOST_STEPS}. Trained on {steps:,} control steps with {run.iterations * config.updates:,} updates. The "
         f"figures are means over the subgoals of {ROBOTS} robots that chase toys one decision ahead for {SECONDS:g} s."
     )
     text = card(f"Step predictor: {spec.name}", what, run, seed, rows)

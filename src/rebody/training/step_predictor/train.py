@@ -20,6 +20,8 @@ from rebody.control.sac import SACBatch, SACState
 from rebody.control.step_predictor import MOST_STEPS, StepPredictor, steps_of
 from rebody.control.tracker import Command, Tracker, tracker_observation
 from rebody.errors import RebodyError
+from rebody.jax_settings import own_jax_settings
+from rebody.ranges import check_ranges
 from rebody.training.ring import draw, newest, write
 from rebody.training.run import Metrics, Run
 from rebody.training.step_predictor.chase import World, advance, begin
@@ -42,6 +44,7 @@ class RunState(eqx.Module):
     iteration: Int[np.ndarray, ""]
 
 
+@own_jax_settings()
 def train_step_predictor(
     robot: str,
     tracker: str | None,
@@ -50,27 +53,32 @@ def train_step_predictor(
     seed: int,
     *,
     resume: bool = False,
+    finish: bool = False,
     init_from: str | None = None,
 ) -> Path:
     """Train a step predictor for a tracker, by default `tracker-ROBOT`; returns the artifact's folder.
 
     RebodyError if `out` holds another run, or robot, tracker and `init_from` do not fit; Interrupted on Ctrl-C.
     """
+    check_ranges(config)
     if config.steps < MOST_STEPS:
         raise RebodyError(f"--steps must be at least {MOST_STEPS}: so long can a subgoal be held.")
     spec = load_robot(robot)
     loaded = load_tracker(tracker or f"tracker-{spec.name}")
     check_robot_of(loaded, spec)
     settings = {"robot": robot, "tracker": tracker, "seed": seed, "init_from": init_from}
-    run = Run(out, asdict(config) | settings, resume=resume)
-    batch = RobotBatch(spec, config.robots)
-    batch.reset(np.random.default_rng((seed, 1)))
-    state = run.restore(initial_state(config, batch, loaded.tracker, jax.random.key(seed), init_from))
-    batch.state = state.physics
-    state = run.loop(
-        state, lambda state: iterate(state, batch, loaded.tracker, config, seed), config.iterations, "step predictor"
-    )
-    return save_step_predictor(_predictor(state, loaded), loaded, spec, config, run, seed)
+    with Run(out, asdict(config) | settings, resume=resume, finish=finish) as run:
+        batch = RobotBatch(spec, config.robots)
+        batch.reset(np.random.default_rng((seed, 1)))
+        state = run.restore(initial_state(config, batch, loaded.tracker, jax.random.key(seed), init_from))
+        batch.state = state.physics
+        state = run.loop(
+            state,
+            lambda state: iterate(state, batch, loaded.tracker, config, seed),
+            config.iterations,
+            "step predictor",
+        )
+        return save_step_predictor(_predictor(state, loaded), loaded, spec, config, run, seed)
 
 
 def iterate(

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float, Int, PRNGKeyArray
 
+from rebody import ranges
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import MassDamper, ToyState
 from rebody.control.tracker import MARGIN, Command, slots_of
@@ -23,9 +24,9 @@ Share = float | Float[AnyArray, ""]
 class CommandDistribution:
     """How commands are drawn."""
 
-    near_share: float = 0.35
+    near_share: ranges.Share = 0.35
     """Share of goals drawn log-uniformly between 0.01 and 1 m."""
-    zero_share: float = 0.1
+    zero_share: ranges.Share = 0.1
     """Share of commands that ask to stand still."""
     only: SlotName | None = None
     """The one slot that is asked for; None for all. One network per slot is the other way (thesis 5.6)."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from rebody.bodies.robot import Reach
 from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
+from rebody.ranges import Copies, Count, NotNegative, Number, Positive, Rows, Share
 from rebody.training.tracker.commands import CommandDistribution
 
 
@@ -14,33 +15,33 @@ class TrackerConfig:
 
     reach: Reach
     """What is asked of the robot, but for a margin."""
-    robots: int = 64
+    robots: Copies = 64
     """Copies that move in parallel."""
-    steps: int = 32
+    steps: Copies = 32
     """Control steps of each robot in an iteration."""
-    updates: int = 256
+    updates: Count = 256
     """Updates in an iteration."""
-    iterations: int = 700
+    iterations: Number = 700
     """Length of the run."""
-    replay: int = 500_000
+    replay: Rows = 500_000
     """Transitions kept."""
-    relabelled: float = 0.5
+    relabelled: Share = 0.5
     """Share of a batch whose commands are drawn anew."""
-    segment_s: tuple[float, float] = (1.0, 8.0)
+    segment_s: tuple[Positive, Positive] = (1.0, 8.0)
     """Shortest and longest time between changes of the command (thesis 6.3.3) [s]."""
-    curriculum_iterations: int = 0
+    curriculum_iterations: Number = 0
     """The thesis' curriculum (6.4.1) in place of `segment_s`: for so many iterations an order lasts for a trajectory of
     300 control steps; then trajectories of 1000, a new order every 125, and often once one is reached. 0 for none."""
-    widening_iterations: int = 0
+    widening_iterations: Number = 0
     """Over so many iterations the speeds asked for widen from a quarter of the robot's reach to all of it: asked for
     too much too early, a robot that has to balance learns to stand still instead."""
-    guided_share: float = 0.25
+    guided_share: Share = 0.25
     """Share of commands that come from a toy ahead of the robot, renewed at every decision."""
-    max_horizon: int = 15
+    max_horizon: Copies = 15
     """Farthest look ahead of that toy [decisions]."""
-    push_every_s: float = 4.0
+    push_every_s: Positive = 4.0
     """Mean time between pushes [s]."""
-    push: float = 0.3
+    push: NotNegative = 0.3
     """Largest change of a robot's speed by a push, either way [m/s]."""
     commands: CommandDistribution = field(default_factory=CommandDistribution)
     """How commands are drawn."""

@@ -8,8 +8,10 @@ import jax
 import numpy as np
 from gymnasium import spaces
 
+from rebody import inputs
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control.tracker import Command, after, tracker_observation, tracker_reward
+from rebody.jax_settings import own_jax_settings
 from rebody.training.motion import motion_of
 from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.orders import draw_commands
@@ -32,11 +34,13 @@ class TrackerEnv(gymnasium.Env):
         self.action_space = spaces.Box(-1.0, 1.0, (self._spec.model.nu,), np.float32)
 
     @cached_property
+    @own_jax_settings()
     def observation_space(self) -> spaces.Box:
         """Joint state, then the command."""
         size = len(self._observe(Command(np.zeros(1, np.int32), np.zeros(1, np.float32))))
         return spaces.Box(-np.inf, np.inf, (size,), np.float32)
 
+    @own_jax_settings()
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
         """The rest pose, and a new command."""
         super().reset(seed=seed)
@@ -44,13 +48,15 @@ class TrackerEnv(gymnasium.Env):
         self._new_command()
         return self._observe(self._command), {}
 
-    def step(self, action: np.ndarray):
+    @own_jax_settings()
+    def step(self, action: Any):
         """One control step with an action in [-1, 1]; larger ones are clipped."""
+        action = inputs.numbers(action, (self._spec.model.nu,), "the action")
         before = self._batch.qpos.copy()
-        self._batch.step(np.asarray(action, np.float64)[None])
+        self._batch.step(action[None])
         motion = motion_of(self._batch, before)
         told, config = self._command, self._config
-        reward = _reward(told, motion, np.asarray(action, np.float32)[None], self._spec.control_dt, config)
+        reward = _reward(told, motion, action.astype(np.float32)[None], self._spec.control_dt, config)
         self._command = jax.tree.map(np.asarray, after(told, motion))
         self._steps_left -= 1
         if self._steps_left < 0:

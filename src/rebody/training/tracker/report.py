@@ -92,7 +92,7 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
         "actions": actor.actions,
         "hidden": config.sac.hidden,
         "projections": config.sac.projections,
-        "training": asdict(config) | {"seed": seed, "wall_s": run.wall_s},
+        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
     }
     condition = f"{COMMANDS} held-out commands, {SECONDS:g} s"
     asked = {
@@ -110,8 +110,8 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
         "zero command: mean speed in the last second": f"{figures['zero speed']:.4f} m/s",
         "fell": f"{100 * figures['fell']:.1f} %",
     }
-    steps = config.iterations * config.steps * config.robots
-    updates = config.iterations * config.updates
+    steps = run.iterations * config.steps * config.robots
+    updates = run.iterations * config.updates
     what = (
         f"Low-level policy of '{spec.name}' with the slots {', '.join(tracker.slots)}: (joint state, subgoal) -> "
         f"joint action. Trained on {steps:,} control steps with {updates:,} updates."

@@ -19,6 +19,8 @@ from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.tracker import Command, Motion, Tracker, after, slots_of, tracker_observation, tracker_reward
 from rebody.errors import RebodyError
+from rebody.jax_settings import own_jax_settings
+from rebody.ranges import check_ranges
 from rebody.training.motion import motion_of
 from rebody.training.ring import draw, newest, write
 from rebody.training.run import Metrics, Run
@@ -53,6 +55,7 @@ class RunState(eqx.Module):
     iteration: Int[np.ndarray, ""]
 
 
+@own_jax_settings()
 def train_tracker(
     robot: str,
     config: TrackerConfig,
@@ -60,6 +63,7 @@ def train_tracker(
     seed: int,
     *,
     resume: bool = False,
+    finish: bool = False,
     init_from: str | None = None,
 ) -> Path:
     """Train a tracker; returns the artifact's folder.
@@ -67,17 +71,20 @@ def train_tracker(
     RebodyError if `out` holds another run, `init_from` has other sizes, or the robot has no such slot as the only one
     asked for; Interrupted on Ctrl-C.
     """
+    check_ranges(config)
     spec = load_robot(robot)
     only, slots = config.commands.only, slots_of(config.reach)
     if only not in (None, *slots):
         raise RebodyError(f"'{spec.name}' is not trained for slot '{only}'; it has: {', '.join(slots)}.")
-    run = Run(out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume)
-    batch = RobotBatch(spec, config.robots)
-    batch.reset(np.random.default_rng((seed, 1)))
-    state = run.restore(initial_state(config, batch, jax.random.key(seed), init_from))
-    batch.state = state.physics
-    state = run.loop(state, lambda state: iterate(state, batch, config, seed), config.iterations, "tracker")
-    return save_tracker(_tracker(state, config), spec, config, run, seed)
+    with Run(
+        out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume, finish=finish
+    ) as run:
+        batch = RobotBatch(spec, config.robots)
+        batch.reset(np.random.default_rng((seed, 1)))
+        state = run.restore(initial_state(config, batch, jax.random.key(seed), init_from))
+        batch.state = state.physics
+        state = run.loop(state, lambda state: iterate(state, batch, config, seed), config.iterations, "tracker")
+        return save_tracker(_tracker(state, config), spec, config, run, seed)
 
 
 def iterate(state: RunState, batch: RobotBatch, config: TrackerConfig, seed: int) -> tuple[RunState, Metrics]:

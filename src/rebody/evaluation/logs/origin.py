@@ -1,0 +1,32 @@
+"""Where a log's positions count from."""
+
+from dataclasses import replace
+
+from rebody.evaluation.logs.file import COLUMNS, Log
+from rebody.inference.contract import Contract
+from rebody.tasks import FAMILIES
+
+HORIZONTAL = ("x", "y")
+"""Fields that may begin anywhere; a height or a pitch is told from the rest pose."""
+FARTHEST_M = 15.0
+"""Distance [m] for fields that the module learned no goals of."""
+
+
+def begun_at_zero(log: Log, contract: Contract) -> Log:
+    """The log with positions that begin farther from 0 than any goal of the training counted from the first row."""
+    fields, notes = dict(log.fields), list(log.notes)
+    for field in HORIZONTAL:
+        if field not in fields or abs(start := float(fields[field][0])) <= (farthest := _farthest(field, contract)):
+            continue
+        fields[field] = fields[field] - start
+        notes.append(
+            f"{COLUMNS[field]} begins at {start:g} m, and the module knows places up to {farthest:g} m: positions and "
+            f"targets are counted from the first row, {start:g} m less than in the log."
+        )
+    return replace(log, fields=fields, notes=tuple(notes))
+
+
+def _farthest(field: str, contract: Contract) -> float:
+    """Goal of the training [m]."""
+    learned = [contract.target_ranges.get(family.name, ()) for family in FAMILIES if family.field == field]
+    return max((abs(end) for ends in learned for end in ends), default=FARTHEST_M)

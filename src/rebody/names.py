@@ -1,0 +1,90 @@
+"""What can be asked for by name, with a line about each: all that `rebody list` prints.
+
+Importing this loads no library, so that a list or a help costs nothing. Agents and figures are described here and
+nowhere else; families and presets are described where they are defined, and tests hold these lines to that.
+"""
+
+from pathlib import Path
+
+POINT_MASS = "point-mass"
+ROBOTS = Path(__file__).parent / "bodies" / "robots"
+ARTIFACTS = Path(__file__).parent / "artifacts"
+
+FAMILIES = {
+    "goal": "m, solved within 0.25",
+    "velocity": "m/s, solved within 0.25",
+    "stand": "rad, solved within 0.2",
+    "jump": "m/s, solved within 0.4",
+}
+"""Families of tasks: unit of the target, and tolerance."""
+AGENTS = {
+    "reuse": "the frozen module and the frozen policy of the toy",
+    "retrain": "the frozen module, and a high-level policy that was learned on the robot",
+    "readout": "the target read linearly from the module's belief, handed to the tracker",
+    "bayes": "the exact posterior in place of the module, its most probable target handed to the tracker",
+    "oracle": "told the task",
+    "flat": "the frozen module, and a policy without hierarchy that was learned on the robot",
+    "scratch": "module and policy that were learned on the robot together, nothing reused",
+    "idle": "knows nothing and stands still",
+}
+"""Every kind of agent, and what it is."""
+PRESETS = {
+    "position": "Reach a hidden position within +-10 m on the mass-damper, reward -|error| (thesis 6.3.1).",
+    "position-thesis": (
+        "The thesis' first experiment (6.3.1): positions in [0, 10] m, steps of at most 0.1 m, a latent of one number."
+    ),
+    "goal-velocity": (
+        "Reach a hidden position or run at a hidden speed, front or back (thesis 6.4.2), told apart without labels."
+    ),
+    "goal-velocity-thesis": "`goal-velocity` on the ranges of the thesis' code: +-[1, 25] m and +-[0.5, 3] m/s.",
+    "goal-velocity-noise-0": "`goal-velocity` without ripple, lag and gain: nothing disturbs the toy.",
+    "goal-velocity-noise-0.1": ("`goal-velocity` with the thesis' observation noise of variance 0.1 in their place."),
+    "goal-velocity-noise-0.2": ("`goal-velocity` with the thesis' observation noise of variance 0.2 in their place."),
+    "goal-velocity-stand": (
+        "`goal-velocity`, or stand at a hidden pitch, front or back, on the full toy (thesis 6.5.2)."
+    ),
+    "goal-velocity-jump": (
+        "`goal-velocity`, or leave the floor at a hidden vertical speed, on the full toy (thesis B.2)."
+    ),
+}
+"""Presets of `rebody train inference`."""
+FIGURES = {
+    "6.1": "the toy in MuJoCo, and the forces on it",
+    "6.2": "return during training on the toy",
+    "6.3": "the trained module on the toy",
+    "6.5": "a flat policy on the cheetah: trajectories",
+    "6.6": "a flat policy on the cheetah: training",
+    "6.7": "the cheetah's tracker: training",
+    "6.8": "the naive transfer to the cheetah: a decision at every control step",
+    "6.9": "striding on the cheetah",
+    "6.10": "hidden positions on the hopper",
+    "6.11": "hidden positions on the walker",
+    "6.12": "trackers of robots that have to balance: training",
+    "6.13": "return during training on goals and speeds",
+    "6.14a": "the toy on goals and speeds",
+    "6.14b": "latents of goals and speeds in two dimensions",
+    "6.15": "goals and speeds on the cheetah, by what disturbed the toy in training",
+    "6.16": "goals and speeds on the cheetah, zero-shot",
+    "6.17": "goals and speeds on the walker, zero-shot",
+    "6.18": "goals and speeds on the hopper, zero-shot",
+    "6.19": "high levels learned on robots: training",
+    "6.20": "high levels learned on the cheetah: goals and speeds",
+    "6.21": "high levels learned on walker and hopper: goals and speeds",
+    "6.22": "a high level learned on the cheetah: goals, speeds and stands",
+}
+"""Figures of the thesis' chapter 6 by number, with their titles."""
+
+
+def shipped_robots() -> tuple[str, ...]:
+    """Names of the robots that come with the package."""
+    return tuple(sorted(path.stem for path in ROBOTS.glob("*.toml")))
+
+
+def artifact_titles() -> dict[str, str]:
+    """The first line of each shipped artifact's card, by the artifact's name; nothing else of it is read."""
+    return {card.parent.name: _title(card) for card in sorted(ARTIFACTS.glob("*/card.md"))}
+
+
+def _title(card: Path) -> str:
+    with card.open(encoding="utf-8") as lines:
+        return lines.readline().strip().lstrip("# ")

@@ -1,0 +1,23 @@
+"""Gymnasium knows the environments whichever is imported first, and `import rebody` does not import Gymnasium."""
+
+import subprocess
+import sys
+
+import pytest
+
+
+@pytest.mark.parametrize(
+    "imports",
+    [
+        "import sys, rebody; assert not {'gymnasium', 'numpy'} & sys.modules.keys(); import gymnasium",
+        "import gymnasium, rebody",
+        "import rebody, gymnasium.envs.registration, importlib.util; importlib.util.find_spec('gymnasium.envs')",
+    ],
+)
+def test_registered_in_any_order(imports):
+    code = f"{imports}\nprint(*(name for name in gymnasium.registry if name.startswith('rebody/')), sep='\\n')"
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
+    assert done.stderr == ""
+    robots = ("HalfCheetah", "Hopper", "Walker2d")
+    expected = {f"rebody/{robot}{what}-v0" for robot in robots for what in ("", "Tracker")} | {"rebody/PointMass-v0"}
+    assert set(done.stdout.split()) == expected

@@ -1,0 +1,31 @@
+"""What `rebody list` prints agrees with what it is about."""
+
+from rebody import names
+from rebody.evaluation.evaluate import POINT_MASS
+from rebody.report.thesis import FIGURES
+from rebody.store import load_artifact, shipped_artifacts
+from rebody.tasks import FAMILIES
+from rebody.training.inference import PRESETS
+
+
+def test_families():
+    assert {family.name: f"{family.unit}, solved within {family.tolerance:g}" for family in FAMILIES} == names.FAMILIES
+
+
+def test_presets():
+    assert {name: preset.__doc__.splitlines()[0] for name, preset in PRESETS.items()} == names.PRESETS
+    assert list(names.PRESETS) == list(PRESETS)
+
+
+def test_figures():
+    assert list(names.FIGURES) == list(FIGURES)
+
+
+def test_artifacts():
+    assert list(names.artifact_titles()) == [name for name, _ in shipped_artifacts()]
+    card = load_artifact("tracker-cheetah").card
+    assert card.startswith(f"# {names.artifact_titles()['tracker-cheetah']}\n")
+
+
+def test_the_toy():
+    assert names.POINT_MASS == POINT_MASS
