@@ -18,7 +18,7 @@ def moment(i: int, hidden: TaskSpec, believed: str) -> Moment:
     latent = Belief(np.zeros(2), np.ones(2))
     base_tasks = {("goal", 1): 0.7, ("goal", -1): 0.3} if believed == "goal" else {("goal", 1): 0.2, ("goal", -1): 0.8}
     reading = Reading(believed, 10.0 + i, base_tasks, {}, latent)
-    return Moment(0.1 * (i + 1), hidden, {"goal": 1.0 * i, "velocity": 2.0 * i, "stand": 0.0}, -1.0, reading, None)
+    return Moment(0.1 * (i + 1), hidden, {"goal": 1.0 * i, "velocity": 2.0 * i, "stand": 0.0}, -1.0, reading, (), None)
 
 
 GOAL, RUN = TaskSpec("goal", 4.0), TaskSpec("velocity", 1.5)

@@ -15,6 +15,7 @@ from rebody.tasks.task_file import TaskSpec
 
 viser = pytest.importorskip("viser")
 pytest.importorskip("mjviser")
+from rebody.viewer import page as page_module  # noqa: E402
 from rebody.viewer.controls import SPEEDS, Choice, GiveTask, Offered  # noqa: E402
 from rebody.viewer.page import Page  # noqa: E402
 from rebody.viewer.server import serving  # noqa: E402
@@ -161,6 +162,30 @@ def test_a_target_that_is_no_number_leaves_the_task_as_it_was(toy_trial, heard):
         page.controls.orders.put(GiveTask(TaskSpec("goal", math.nan)))
         wait_for(lambda: bool(heard), "a complaint")
         assert page.session.task == TASK
+
+
+def test_who_cannot_be_watched_is_said_and_the_one_before_goes_on(toy_trial, heard, monkeypatch):
+    def load(choice: Choice):
+        if choice.agent == "flat":
+            raise OSError("no such file")
+        return toy_trial
+
+    def no_scene(*_):
+        raise ValueError("no such shape")
+
+    with shown(load) as (page, _):
+        session = page.session
+        page.controls.orders.put(replace(FIRST, agent="flat"))
+        wait_for(lambda: len(heard) == 1 and "no such file" in heard[0], "a complaint")
+
+        scenes = iter([no_scene, page_module.Scene])
+        monkeypatch.setattr(page_module, "Scene", lambda *arguments: next(scenes)(*arguments))
+        page.controls.orders.put(replace(FIRST, agent="idle"))
+        wait_for(lambda: len(heard) == 2 and "no such shape" in heard[1], "another")
+        stood = session.time_s
+        wait_for(lambda: session.time_s > stood, "time to go on")
+        assert page.session is session
+        assert page.controls._agent.value == "reuse"
 
 
 def test_a_session_that_fails_starts_again(toy_trial, heard, monkeypatch):

@@ -33,6 +33,8 @@ class Moment:
     reward: float
     reading: Reading
     """What the module believes. It listens beside an agent that does without it."""
+    doubts: tuple[str, ...]
+    """About rewards of the last 3.2 s that no task could have paid, and that the module did not believe."""
     subgoal: TaskSpec | None
     """What the agent asks of its tracker from now on; None where nobody asks (a point mass, a flat policy)."""
 
@@ -97,7 +99,8 @@ class Session:
         earned = task_reward(jax.tree.map(lambda field: field[0], self._tasks), state, form)
         self._carry, self._command = decide(self._agent, self._carry, Observation(state, earned))
         reading = self._listener.update(_fields(state, self.trial), earned[0])
-        self.moments.append(Moment(self.time_s, self.task, _reached(state), float(earned[0]), reading, self._subgoal()))
+        heard = float(earned[0]), reading, self._listener.doubts()
+        self.moments.append(Moment(self.time_s, self.task, _reached(state), *heard, self._subgoal()))
 
     def _subgoal(self) -> TaskSpec | None:
         subgoal = self._command.subgoal
