@@ -1,8 +1,8 @@
 """Training runs of every kind, killed at random moments: do they end as if nothing had been?
 
-A tiny run of each trainer is let alone once, and killed (SIGKILL) again and again once more: in the middle of a turn, at
-a call that touches a file of its folder (a checkpoint, the events, the lock), and while its artifact is saved. After
-each kill it goes on with --resume. In the end weights, the whole state and the log must be those of the calm run.
+A tiny run of each trainer is let alone once, and once more it is killed (SIGKILL) again and again: in the middle of a
+turn, at a call that touches a file of its folder (a checkpoint, the events, the lock), and while its artifact is saved.
+After each kill it goes on with --resume. In the end weights, the whole state and the log must be those of the calm run.
 """
 
 import argparse
@@ -24,10 +24,12 @@ import rebody.cli.train  # noqa: F401  every pipeline, before the first life: a 
 from rebody.cli.main import run
 from rebody.store import load_artifact, tree_hash
 from rebody.store.checkpoint import FILE, FOLDER
+from rebody.training.classifier import report as classifier
 from rebody.training.flat import report as flat
 from rebody.training.high_level import report as high_level
 from rebody.training.inference import measure as inference_measure
 from rebody.training.inference import report as inference
+from rebody.training.inference import train as inference_train
 from rebody.training.run import Run
 from rebody.training.scratch import report as scratch
 from rebody.training.step_predictor import report as step_predictor
@@ -52,11 +54,13 @@ TRAINERS = {
 SHORT = (
     (tracker, {"COMMANDS": 4, "SECONDS": 3.0}),
     (inference, {"HELD_OUT": 8}),
+    (inference_train, {"HELD_OUT": 8}),
     (inference_measure, {"DECISIONS": 60}),
     (flat, {"TASKS": 3, "DECISIONS": 30}),
     (scratch, {"TASKS": 4, "DECISIONS": 30}),
     (high_level, {"TASKS": 3, "DECISIONS": 30}),
     (step_predictor, {"ROBOTS": 8, "SECONDS": 2.0}),
+    (classifier, {"HELD_OUT": 8}),
 )
 """Where a trained part is measured, and how much of it is enough here."""
 

@@ -29,7 +29,7 @@ def check_output(
         target = output_file(path)
         try_folder(next(parent for parent in target.parents if parent.exists()))
     except RebodyError as error:
-        raise RebodyError(f"{option}: {error}") from None
+        raise RebodyError(f"{option} {path}: {error}") from None
     if any(path.samefile(each) for each in map(Path, inputs) if path.exists() and each.exists()):
         raise RebodyError(f"{option} {path} would write over what is read. Choose another file.")
     if target.name in (*HASHED, MANIFEST) and (target.parent / MANIFEST).exists():
