@@ -10,7 +10,7 @@ import numpy as np
 
 from rebody.errors import RebodyError
 from rebody.evaluation.logs.cells import number
-from rebody.evaluation.logs.table import check_file
+from rebody.evaluation.logs.table import check_log
 from rebody.evaluation.logs.ticks import COARSEST_S
 
 Delimiter = Literal["comma", "semicolon", "tab", "space"]
@@ -55,7 +55,7 @@ class Format:
 
 def check_format(path: Path, time: str, others: tuple[str, ...], given: Format) -> None:
     """RebodyError that names the options, where the columns of these names can only be read in another format."""
-    check_file(path)
+    check_log(path)
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         text = file.read(HEAD)
     whole = text.splitlines()[: -1 if len(text) == HEAD else None]

@@ -1,7 +1,6 @@
 """A CSV file as text: its columns' names, then row after row."""
 
 import csv
-import stat
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,9 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rebody.errors import RebodyError
+from rebody.store.files import DATA, check_file
 
-LARGEST_FILE = 500_000_000
-"""Bytes. A log of a day at 100 Hz has less; a larger file is no log, or would fill the memory."""
 UNREADABLE = "\ufffd"
 """Takes the place of bytes that are not UTF-8: in a row they damage one cell."""
 
@@ -30,7 +28,7 @@ class Table:
 @contextmanager
 def open_table(path: Path, separator: str) -> Iterator[Table]:
     """RebodyError where the file is no table, also while its rows are read."""
-    check_file(path)
+    check_log(path)
     with path.open(newline="", encoding="utf-8-sig", errors="replace") as file:
         reader = csv.reader(file, delimiter=separator, skipinitialspace=True, strict=True)
         stripped = ((reader.line_num, [cell.strip() for cell in row]) for row in reader)
@@ -52,16 +50,9 @@ def _check_names(path: Path, names: list[str]) -> None:
         raise RebodyError(f"{path} has the column {twice[0]} more than once: which is it?")
 
 
-def check_file(path: Path) -> None:
-    """RebodyError where there is no regular file, as a pipe may never end, or one that is too large."""
+def check_log(path: Path) -> None:
+    """RebodyError where there is no regular file, or one that is too large."""
     try:
-        found = path.stat()
+        check_file(path, DATA)
     except FileNotFoundError:
         raise RebodyError(f"there is no log {path}.") from None
-    if not stat.S_ISREG(found.st_mode):
-        raise RebodyError(f"{path} is not a regular file.")
-    if found.st_size > LARGEST_FILE:
-        raise RebodyError(
-            f"{path} has {found.st_size / 1e6:.0f} MB; a log may have {LARGEST_FILE / 1e6:.0f} MB. Split it, or write "
-            "fewer rows: one every 0.1 s is enough."
-        )
