@@ -17,7 +17,7 @@ import numpy as np
 
 from rebody.agents.parts import load_inference, load_tracker
 from rebody.bodies import load_robot
-from rebody.evaluation.evaluate import Trial, run_trial, trial_agent
+from rebody.evaluation.evaluate import Trial, run_trial, start_seeds, trial_agent
 from rebody.inference.probe import fit_probe
 from rebody.tasks.task_file import active_tasks, read_tasks
 from rebody.types import DECISION_DT, Belief
@@ -32,7 +32,7 @@ def main() -> None:
     latents, speeds = {}, {}
     for name, trial in trials().items():
         tasks = active_tasks(specs, trial.decisions, DECISION_DT)
-        episodes = run_trial(trial, trial_agent(trial, tasks), tasks, np.zeros(len(specs), int))
+        episodes = run_trial(trial, trial_agent(trial, tasks), tasks, start_seeds(specs, np.zeros(len(specs), int)))
         latents[name] = np.asarray(episodes.belief.mean, float)[FROM:]
         speeds[name] = np.asarray(episodes.state.vx, float)[FROM:]
     print_targets(latents, target)

@@ -15,7 +15,7 @@ import numpy as np
 
 from rebody.agents.parts import load_inference, load_tracker
 from rebody.bodies import load_robot
-from rebody.evaluation.evaluate import Trial, run_trial, trial_agent
+from rebody.evaluation.evaluate import Trial, run_trial, start_seeds, trial_agent
 from rebody.evaluation.summary import percentile_95, with_interval
 from rebody.report.style import BELIEF, MOTION, figure
 from rebody.tasks.figures import final_error
@@ -59,7 +59,7 @@ def trials() -> dict[str, Trial]:
 def measure(trial: Trial, specs: list[TaskSpec], seeds: np.ndarray) -> dict[str, np.ndarray]:
     """Error [m], oscillation [m] and settling time [s, infinite if never] of each episode."""
     tasks = active_tasks(specs, trial.decisions, DECISION_DT)
-    episodes = run_trial(trial, trial_agent(trial, tasks), tasks, seeds)
+    episodes = run_trial(trial, trial_agent(trial, tasks), tasks, start_seeds(specs, seeds))
     x, target = np.asarray(episodes.state.x, float), np.array([spec.target for spec in specs])
     outside = np.abs(x - target) > WITHIN
     last_outside = len(x) - 1 - np.argmax(outside[::-1], axis=0)

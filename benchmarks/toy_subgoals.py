@@ -31,7 +31,7 @@ def main() -> None:
     for horizon in HORIZONS:
         trial = Trial("reuse", inference, None, None, horizon=horizon)
         episodes = evaluate(trial, [TaskSpec("goal", float(goal)) for goal in GOALS], 1).episodes
-        toy = np.array([episode.position_m for episode in episodes]).T
+        toy = np.array([episode.quantities["x"] for episode in episodes]).T
         robot = play(np.array([episode.subgoal for episode in episodes]).T, spec, controller)
         errors = [shifted_error(toy, robot, lag, spec.control_dt) for lag in LAGS_S]
         best = int(np.argmin(errors))

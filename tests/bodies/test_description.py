@@ -126,10 +126,12 @@ def test_all_that_is_out_of_range_is_said_at_once(write_own):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    for path in (tmp_path / "none.toml", tmp_path / "folder.toml"):
-        (tmp_path / "folder.toml").mkdir(exist_ok=True)
-        with pytest.raises(RebodyError, match=f"cannot read the robot's file '{path}'"):
-            load_robot(str(path))
+    path = tmp_path / "own.toml"
+    with pytest.raises(RebodyError, match=f"cannot read the robot's file '{path}'"):
+        load_robot(str(path))
+    path.mkdir()
+    with pytest.raises(RebodyError, match=f"{path} is a folder"):
+        load_robot(str(path))
 
 
 def test_bytes_that_are_no_text_are_no_toml(tmp_path):

@@ -12,14 +12,16 @@ def result():
 
     def make(**figures):
         time = 0.1 * np.arange(1, 31)
-        steady = dict.fromkeys(("position_m", "velocity_m_s", "pitch_rad", "vz_max_m_s", "reward"), time.tolist())
+        quantities = dict.fromkeys(("x", "vx", "pitch", "vz"), time.tolist())
         target = figures.get("target", 2.0)
         given = {
-            "family": "goal", "target": target, "seed": 0, "switch": None, "time_s": time.tolist(), **steady,
+            "family": "goal", "target": target, "seed": 0, "switch": None, "time_s": time.tolist(),
+            "quantities": quantities, "reward": time.tolist(),
             "active_family": ["goal"] * 30, "active_target": [target] * 30,
             "inferred_family": ["goal"] * 30, "inferred_target": [target] * 30, "cluster": [0] * 30,
             "latent": [[0.5, -0.5]] * 30, "subgoal_family": ["goal"] * 30, "subgoal": [0.0] * 30, "fell": False,
-            "return_": -3.0, "oracle_return": -2.0, "final_error": 0.1, "final_squared_error": 0.01, "ripple_m_s": 0.2,
+            "return_": -3.0, "oracle_return": -2.0, "idle_return": -4.0,
+            "final_error": 0.1, "final_squared_error": 0.01, "ripple_m_s": 0.2,
         }  # fmt: skip
         return EpisodeResult(**(given | figures))
 

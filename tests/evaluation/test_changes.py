@@ -13,14 +13,14 @@ AFTER = 20
 def changed(result):
     """A function of (old task, new task, decisions until it is read, path) -> the result of one episode."""
 
-    def make(old, new, read_after, position_m=None):
+    def make(old, new, read_after, x=None):
         def along(index, until):
             return [old[index]] * until + [new[index]] * (30 - until)
 
         return result(
             active_family=along(0, 10), active_target=along(1, 10),
             inferred_family=along(0, 10 + read_after - 1), inferred_target=along(1, 10 + read_after - 1),
-            position_m=position_m or [0.0] * 30,
+            quantities={"x": x or [0.0] * 30, "vx": (10 * np.diff([0.0, *(x or [0.0] * 30)])).tolist()},
         )  # fmt: skip
 
     return make

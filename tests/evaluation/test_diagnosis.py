@@ -23,11 +23,11 @@ def episode_of(family="goal", target=4.0, *, read=None, subgoal=None, reached=No
     x, v = ([reached] * TIME, [0.0] * TIME) if family == "goal" else ([0.0] * TIME, [reached] * TIME)
     return EpisodeResult(
         family=family, target=target, seed=0, switch=None, time_s=(0.1 * np.arange(1, TIME + 1)).tolist(),
-        position_m=x, velocity_m_s=v, pitch_rad=[0.0] * TIME, vz_max_m_s=[0.0] * TIME, reward=[paid / TIME] * TIME,
+        quantities={"x": x, "vx": v, "pitch": [0.0] * TIME, "vz": [0.0] * TIME}, reward=[paid / TIME] * TIME,
         active_family=[family] * TIME, active_target=[target] * TIME, inferred_family=[guessed or family] * TIME,
         inferred_target=[read] * TIME, cluster=[0] * TIME, latent=[[0.0, 0.0]] * TIME,
         subgoal_family=[slot or family] * TIME, subgoal=[subgoal] * TIME, fell=False, return_=paid, oracle_return=-5.0,
-        final_error=abs(reached - target), final_squared_error=0.0, ripple_m_s=0.0,
+        idle_return=None,         final_error=abs(reached - target), final_squared_error=0.0, ripple_m_s=0.0,
     )  # fmt: skip
 
 

@@ -14,11 +14,11 @@ from rebody.bodies import load_robot
 from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results
-from rebody.evaluation.evaluate import POINT_MASS, ROBOT_AGENTS
+from rebody.evaluation.evaluate import POINT_MASS, ROBOT_AGENTS, run_trial, take_yardsticks, trial_agent
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import no_mixture
 from rebody.store import tree_hash
-from rebody.tasks.task_file import Switch, TaskSpec
+from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 
 SPECS = [TaskSpec("goal", 2.0), TaskSpec("goal", 1.0, Switch(1.2, "goal", -3.0))]
 SEEDS = 2
@@ -36,10 +36,23 @@ def test_every_task_once_per_seed(results):
     assert (results.robot, results.control_dt, results.tracker, results.horizon) == ("cheetah", 0.05, "tiny-tracker", 5)
 
 
-def test_a_seed_is_a_start(results):
-    pitch = {(episode.target, episode.seed): episode.pitch_rad[0] for episode in results.episodes}
-    assert pitch[2.0, 0] == pytest.approx(pitch[1.0, 0], abs=0.02)
-    assert abs(pitch[2.0, 0] - pitch[2.0, 1]) > 0.02
+def test_every_task_and_seed_has_a_start_of_its_own_whatever_else_is_evaluated(trial, results):
+    def starts(results):
+        return {(episode.target, episode.seed): episode.quantities["pitch"][0] for episode in results.episodes}
+
+    pitch = starts(results)
+    assert len({round(start, 3) for start in pitch.values()}) == len(pitch)
+    alone = starts(evaluate(trial, SPECS[1:], 1))
+    assert alone[1.0, 0] == pytest.approx(pitch[1.0, 0], abs=1e-4)
+
+
+def test_yardsticks_taken_before_save_time_and_change_nothing(trial, results):
+    yardsticks = take_yardsticks(trial, SPECS, SEEDS)
+    assert evaluate(trial, SPECS, SEEDS, yardsticks).episodes == results.episodes
+    for agent in ("oracle", "idle"):
+        told = evaluate(replace(trial, agent=agent), SPECS, SEEDS, yardsticks)
+        returns = [getattr(episode, f"{agent}_return") for episode in results.episodes]
+        assert returns == pytest.approx([episode.return_ for episode in told.episodes], rel=1e-5)
 
 
 def test_the_task_changes_at_its_moment(results):
@@ -48,9 +61,9 @@ def test_the_task_changes_at_its_moment(results):
         late = np.array(episode.time_s) > 1.2 + 1e-9
         np.testing.assert_array_equal(episode.active_target, np.where(late, -3.0, 1.0))
         np.testing.assert_allclose(
-            episode.reward, -np.abs(np.array(episode.position_m) - episode.active_target), atol=1e-4
+            episode.reward, -np.abs(np.array(episode.quantities["x"]) - episode.active_target), atol=1e-4
         )
-        x = np.array(episode.position_m)[-20:]
+        x = np.array(episode.quantities["x"])[-20:]
         assert episode.final_error == pytest.approx(np.abs(x + 3).mean(), abs=1e-4)
 
 
@@ -86,10 +99,11 @@ def test_the_oracle_is_told_the_active_task_and_regrets_nothing(trial, results):
 
 
 def test_the_idle_agent_is_the_same_on_every_task(trial):
-    idle = evaluate(replace(trial, agent="idle"), [TaskSpec("goal", 2.0), TaskSpec("goal", -7.0)], 1)
-    first, second = idle.episodes
-    assert first.position_m == pytest.approx(second.position_m, abs=1e-3)
-    assert first.reward != second.reward
+    idle = replace(trial, agent="idle")
+    tasks = active_tasks([TaskSpec("goal", 2.0), TaskSpec("goal", -7.0)], idle.decisions, 0.1)
+    episodes = run_trial(idle, trial_agent(idle, tasks), tasks, [5, 5])
+    np.testing.assert_allclose(episodes.state.x[:, 0], episodes.state.x[:, 1], atol=1e-3)
+    assert (episodes.reward[:, 0] != episodes.reward[:, 1]).any()
 
 
 def on_the_toy(trial, **changes):
@@ -103,7 +117,7 @@ def test_point_mass(trial, agent):
     oracle = evaluate(on_the_toy(trial, agent="oracle"), SPECS, 1)
     told = [episode.return_ for episode in oracle.episodes]
     assert [episode.oracle_return for episode in results.episodes] == pytest.approx(told, rel=1e-5)
-    x = np.array([episode.position_m for episode in results.episodes])
+    x = np.array([episode.quantities["x"] for episode in results.episodes])
     if agent == "idle":
         assert not x.any()
     else:
@@ -130,8 +144,8 @@ def test_bayes_reads_the_active_task_from_the_toy(trial):
 def test_a_point_mass_may_be_another_one_than_the_module_learned_on(trial):
     slow = evaluate(on_the_toy(trial, agent="bayes", toy=PositionToy(max_step=0.02)), SPECS[:1], 1).episodes[0]
     fast = evaluate(on_the_toy(trial, agent="bayes"), SPECS[:1], 1).episodes[0]
-    assert np.abs(np.diff(slow.position_m)).max() <= 0.02 + 1e-5
-    assert np.abs(np.diff(fast.position_m)).max() > 0.02 + 1e-3
+    assert np.abs(np.diff(slow.quantities["x"])).max() <= 0.02 + 1e-5
+    assert np.abs(np.diff(fast.quantities["x"])).max() > 0.02 + 1e-3
 
 
 FAR_AND_NEAR = [TaskSpec("goal", target) for target in (-9.0, -3.0, 3.0, 9.0)]
@@ -200,7 +214,7 @@ def test_a_flat_policy_has_no_subgoal(trial, tmp_path):
     saved = json.loads((tmp_path / "flat.json").read_text(), parse_constant=pytest.fail)
     assert saved["episodes"][0]["subgoal"] == [None] * 30
     alone = evaluate(replace(trial, agent="flat", tracker=None), SPECS[:1], 1)
-    assert alone.episodes[0].position_m == flat.episodes[0].position_m
+    assert alone.episodes[0].quantities["x"] == flat.episodes[0].quantities["x"]
     assert alone.summary["regret"] is None  # a robot's oracle needs a tracker
 
 

@@ -10,6 +10,7 @@ import pytest
 from rich.console import Console
 
 from rebody.agents.rollout import Episodes
+from rebody.errors import RebodyError
 from rebody.evaluation import Results, save_results, summary_table
 from rebody.evaluation.results import episode_results
 from rebody.tasks import GOAL, STAND, VELOCITY
@@ -21,12 +22,12 @@ HEAD = {
     "episodes", "summary",
 }  # fmt: skip
 SERIES = {
-    "time_s", "position_m", "velocity_m_s", "pitch_rad", "vz_max_m_s", "reward", "active_family", "active_target",
+    "time_s", "reward", "active_family", "active_target",
     "inferred_family", "inferred_target", "cluster", "latent", "subgoal_family", "subgoal",
 }  # fmt: skip
-EPISODE = SERIES | {"family", "target", "seed", "fell", "return", "oracle_return", "final_error"}
+EPISODE = SERIES | {"family", "target", "seed", "quantities", "fell", "return", "oracle_return", "final_error"}
 BESIDE_HEAD = {"tracker"}
-BESIDE_EPISODE = {"final_squared_error", "ripple_m_s"}
+BESIDE_EPISODE = {"final_squared_error", "ripple_m_s", "idle_return"}
 DECISIONS = 40
 
 
@@ -49,9 +50,11 @@ def test_names_of_the_file(results, tmp_path):
     content = read(tmp_path / "new" / "out.json")
     assert content.keys() == HEAD | BESIDE_HEAD
     assert [episode.keys() for episode in content["episodes"]] == [EPISODE | BESIDE_EPISODE] * 2
-    assert content["version"] == 1
+    assert content["version"] == 2
     assert (content["decision_dt"], content["control_dt"]) == (0.1, 0.05)
     assert content["episodes"][0]["return"] == -3.0
+    assert content["episodes"][0]["target"] == [2.0]
+    assert content["episodes"][0]["active_target"] == [[2.0]] * 30
     assert content["summary"] == json.loads(json.dumps(results.summary))
     assert os.listdir(tmp_path / "new") == ["out.json"]
 
@@ -80,7 +83,7 @@ def test_a_full_disk_leaves_the_old_file(results, tmp_path, monkeypatch):
         raise OSError("no space left on device")
 
     monkeypatch.setattr(Path, "write_text", write_half)
-    with pytest.raises(OSError, match="no space"):
+    with pytest.raises(RebodyError, match=r"out\.json cannot be written: no space"):
         save_results(results, path)
     assert path.read_text() == "old"
     monkeypatch.undo()
@@ -120,7 +123,9 @@ def judged(episodes):
     family[-1] = VELOCITY
     read = (family, np.full(family.shape, 0.123456789, np.float32))
     cluster = np.arange(2 * DECISIONS).reshape(DECISIONS, 2) // 60
-    return episode_results(specs, np.array([0, 3]), tasks, episodes, read, cluster, np.array([-7.0, -8.0]))
+    return episode_results(
+        specs, np.array([0, 3]), tasks, episodes, read, cluster, {"oracle": np.array([-7.0, -8.0]), "idle": None}
+    )
 
 
 def test_one_entry_per_decision(judged):
@@ -133,10 +138,10 @@ def test_one_entry_per_decision(judged):
 
 def test_series_are_those_of_the_episode(judged):
     stands, runs = judged
-    assert stands.position_m == [4.0] * DECISIONS
-    assert runs.position_m == pytest.approx(1.5 * np.array(runs.time_s), abs=1e-5)
-    assert runs.velocity_m_s == [1.5] * DECISIONS
-    assert stands.pitch_rad == [0.3] * DECISIONS
+    assert stands.quantities["x"] == [4.0] * DECISIONS
+    assert runs.quantities["x"] == pytest.approx(1.5 * np.array(runs.time_s), abs=1e-5)
+    assert runs.quantities["vx"] == [1.5] * DECISIONS
+    assert stands.quantities["pitch"] == [0.3] * DECISIONS
     assert stands.latent[0] == [4.0, -4.0]
     assert stands.subgoal == [5.0] * DECISIONS
     assert stands.subgoal_family == ["goal"] * DECISIONS
@@ -148,7 +153,7 @@ def test_series_are_those_of_the_episode(judged):
 
 
 def test_largest_vz_is_that_of_the_last_second(judged):
-    vz = np.array(judged[0].vz_max_m_s)
+    vz = np.array(judged[0].reached_of("jump"))
     np.testing.assert_array_equal(vz[:3], np.zeros(3))
     np.testing.assert_array_equal(vz[3:13], np.full(10, 2.0))  # 2 m/s at the fourth decision
     np.testing.assert_array_equal(vz[13:], np.zeros(DECISIONS - 13))  # -1 m/s is never the largest
@@ -164,7 +169,7 @@ def test_returns_and_errors(judged):
 def test_a_pitch_is_judged_as_such(episodes):
     specs, cluster = [TaskSpec("stand", 1.0), TaskSpec("stand", -0.2)], np.zeros(episodes.reward.shape, int)
     tasks, read = active_tasks(specs, DECISIONS, 0.1), (np.full(cluster.shape, STAND), episodes.reward)
-    leans = episode_results(specs, np.arange(2), tasks, episodes, read, cluster, None)
+    leans = episode_results(specs, np.arange(2), tasks, episodes, read, cluster, {"oracle": None, "idle": None})
     assert [episode.final_error for episode in leans] == pytest.approx([0.7, 0.5])
     assert [episode.final_squared_error for episode in leans] == pytest.approx([0.49, 0.25])
     assert {*leans[0].inferred_family, *leans[1].active_family} == {"stand"}

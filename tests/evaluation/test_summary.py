@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rebody.evaluation.statistics import percentile_95, regret, with_interval
+from rebody.evaluation.statistics import percentile_95, regret, share_of_oracle, with_interval
 from rebody.evaluation.summary import summarise
 
 VALUES = np.random.default_rng(0).gamma(1.0, size=40)
@@ -30,6 +30,30 @@ def test_an_interval_of_nothing_that_varies_is_a_point(values):
     assert with_interval(values, np.mean) == {"value": values[0], "low": values[0], "high": values[0]}
 
 
+def test_an_interval_is_over_tasks_not_over_their_starts():
+    """Starts that add nothing leave it as wide as one start of each task."""
+    tasks = np.repeat(np.arange(40), 5).tolist()
+    found = with_interval(np.repeat(VALUES, 5), np.mean, tasks)
+    assert found == pytest.approx(with_interval(VALUES, np.mean))
+    too_sure = with_interval(np.repeat(VALUES, 5), np.mean)
+    assert too_sure["high"] - too_sure["low"] < 0.6 * (found["high"] - found["low"])
+
+
+def test_the_share_is_0_for_idle_and_1_for_the_oracle():
+    rows = np.array([[-3.0, -2.0, -6.0], [-3.0, -2.0, -6.0]])
+    assert share_of_oracle(rows) == pytest.approx(0.75)
+    assert share_of_oracle(rows[:, [1, 1, 2]]) == 1.0
+    assert share_of_oracle(rows[:, [2, 1, 2]]) == 0.0
+
+
+def test_seeds_are_told_apart(result):
+    episodes = [result(target=t, seed=seed, final_error=t + seed) for t in (1.0, 2.0, 4.0) for seed in (0, 1)]
+    summary = summarise(episodes)
+    assert (summary["episodes"], summary["tasks"]) == (6, 3)
+    assert summary["families"]["goal"]["median_error_by_seed"] == {"0": 2.0, "1": 3.0}
+    assert summary["share"]["value"] == pytest.approx(0.5)  # -3 between -2 and -4
+
+
 def test_regret_is_of_sums_and_relative_to_the_oracle():
     assert regret(np.array([[-3.0, -2.0], [-6.0, -4.0]])) == pytest.approx(0.5)
     assert regret(np.array([[-1.0, -2.0], [-5.0, -4.0]])) == pytest.approx(0.0)
@@ -44,7 +68,11 @@ def test_statistics_of_a_family_by_hand(result):
         for error in errors
     ]
     summary = summarise(episodes)
-    goal = {name: figure["value"] for name, figure in summary["families"]["goal"].items() if name != "episodes"}
+    goal = {
+        name: figure["value"]
+        for name, figure in summary["families"]["goal"].items()
+        if "value" in (figure if isinstance(figure, dict) else ())
+    }
     assert goal == pytest.approx(
         {
             "median_error": 0.25,

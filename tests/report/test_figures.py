@@ -19,12 +19,13 @@ def episode_of(target, family="goal", error=0.1):
     time = 0.1 * np.arange(1, TIME + 1)
     x = target * (1 - np.exp(-time))
     return EpisodeResult(
-        family=family, target=target, seed=0, switch=None, time_s=time.tolist(), position_m=x.tolist(),
-        velocity_m_s=np.gradient(x, time).tolist(), pitch_rad=[0.0] * TIME, vz_max_m_s=[0.0] * TIME,
+        family=family, target=target, seed=0, switch=None, time_s=time.tolist(),
+        quantities={"x": x.tolist(), "vx": np.gradient(x, time).tolist(), "pitch": [0.0] * TIME, "vz": [0.0] * TIME},
         reward=(-np.abs(x - target)).tolist(), active_family=[family] * TIME, active_target=[target] * TIME,
         inferred_family=[family] * TIME, inferred_target=x.tolist(), cluster=[0] * TIME,
         latent=np.stack([x, -x], axis=-1).tolist(), subgoal_family=[family] * TIME, subgoal=x.tolist(), fell=False,
-        return_=-3.0, oracle_return=-2.0, final_error=error, final_squared_error=error**2, ripple_m_s=0.0,
+        return_=-3.0, oracle_return=-2.0, idle_return=-4.0,
+        final_error=error, final_squared_error=error**2, ripple_m_s=0.0,
     )  # fmt: skip
 
 
@@ -98,7 +99,7 @@ def test_each_family_is_drawn_by_itself_while_it_counts(switched, family, wanted
         shown = np.flatnonzero(np.isfinite(lines[name]))
         np.testing.assert_array_equal(lines[name][shown], value)
         assert (shown[0], shown[-1]) == (begin, end)
-    robot = switched.position_m if family == "goal" else switched.velocity_m_s
+    robot = switched.quantities["x" if family == "goal" else "vx"]
     np.testing.assert_allclose(lines["robot"], robot[:20])
 
 

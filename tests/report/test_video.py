@@ -1,5 +1,7 @@
 """A film lasts as long as its episode and shows the robot."""
 
+import os
+
 import imageio_ffmpeg
 import numpy as np
 import pytest
@@ -86,3 +88,27 @@ def test_an_ffmpeg_that_fails_is_one_message(error, trial, tmp_path, monkeypatch
     with pytest.raises(RebodyError, match="ffmpeg could not write a video into"):
         film(trial, TaskSpec("goal", 2.0), tmp_path / "film.mp4")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("opengl", "small")
+def test_a_film_that_was_not_finished_leaves_the_old_one(trial, tmp_path, monkeypatch):
+    """On a disk that fills up with the last bytes, ffmpeg's writer ends as if all were well."""
+    path, write_frames = tmp_path / "film.mp4", imageio_ffmpeg.write_frames
+    path.write_bytes(b"old")
+
+    def cut_short(unfinished, *size, **options):
+        writer = write_frames(unfinished, *size, **options)
+        writer.send(None)
+        yield
+        try:
+            while True:
+                writer.send((yield))
+        finally:
+            writer.close()
+            os.truncate(unfinished, 2000)
+
+    monkeypatch.setattr(imageio_ffmpeg, "write_frames", cut_short)
+    with pytest.raises(RebodyError, match="Is the disk full"):
+        film(trial, TaskSpec("goal", 2.0), path)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]

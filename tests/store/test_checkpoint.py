@@ -92,7 +92,7 @@ def test_failure_midway_leaves_the_old_one(folder, monkeypatch):
 
 def test_a_full_disk_is_one_message_and_leaves_the_old_one(folder, little_space):
     large = state() | {"replay": np.zeros(100_000)}
-    with little_space(4096), pytest.raises(RebodyError, match=r"cannot be written: .*\. The one before is still there"):
+    with little_space(4096), pytest.raises(RebodyError, match=r"cannot be written: .*\. Any earlier one is whole"):
         save_checkpoint(folder, large, META)
     assert tree_hash(load_checkpoint(folder, state())[0]) == tree_hash(state())
     assert [entry.name for entry in folder.iterdir()] == [checkpoint.FILE]

@@ -1,5 +1,6 @@
 """Files are read and written whole or not at all, and regular ones only."""
 
+import errno
 import os
 import socket
 from pathlib import Path
@@ -63,6 +64,18 @@ def test_a_link_in_the_way_of_the_unfinished_file_is_not_followed(tmp_path):
     (tmp_path / ".file.new.txt").symlink_to(tmp_path / "mine")
     write(tmp_path / "file.txt")
     assert (tmp_path / "mine").read_text() == "mine"
+
+
+def test_a_file_that_is_a_mount_point_is_written_to(tmp_path, monkeypatch):
+    def replace(source, target):
+        raise OSError(errno.EBUSY, "Device or resource busy")
+
+    path = tmp_path / "file.txt"
+    path.write_text("old")
+    monkeypatch.setattr(os, "replace", replace)
+    write(path, "new")
+    assert path.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 @pytest.fixture(params=["a pipe", "a socket", "a folder", "a device"])

@@ -92,7 +92,7 @@ def test_a_file_that_is_no_list_of_tasks(file_of, content, said):
 def test_a_file_that_cannot_be_read(tmp_path):
     with pytest.raises(RebodyError, match="there is no task file"):
         read_tasks(tmp_path / "none.json")
-    with pytest.raises(RebodyError, match="is not a JSON file"):
+    with pytest.raises(RebodyError, match="is a folder"):
         read_tasks(tmp_path)
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(RebodyError, match="is not a JSON file"):

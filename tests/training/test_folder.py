@@ -1,5 +1,6 @@
 """A run's folder: its own, tried before training, wherever a link leads, and whole when the disk is full."""
 
+import re
 from functools import partial
 from types import SimpleNamespace
 
@@ -46,6 +47,13 @@ def test_what_cannot_be_saved_is_said_before_training(tracker, tmp_path, monkeyp
     assert "card.md is a folder" in capsys.readouterr().err
     assert tracker("/proc/run") == 2
     assert "the folder /proc/run cannot be written to" in capsys.readouterr().err
+
+
+def test_so_is_a_disk_that_has_no_room_for_checkpoints(tracker, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=100_000))
+    monkeypatch.setattr(tracker.train, "iterate", None)
+    assert tracker(tmp_path / "run", "--replay", 1000) == 2
+    assert re.search(r"needs 0\.\d MB, and its disk has 0\.1 MB left", capsys.readouterr().err)
 
 
 def test_a_link_is_followed(tracker, tmp_path):

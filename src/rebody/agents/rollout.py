@@ -1,7 +1,7 @@
 """Episodes of an agent on a toy (one compiled scan) and on robots (a loop on the host)."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import equinox as eqx
 import jax
@@ -17,6 +17,8 @@ from rebody.bodies.toys import Disturbance, Toy
 from rebody.tasks import RewardForm, reward
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task
 
+Starts = Sequence[int] | Int[np.ndarray, " episode"]
+"""What the reset noise of each episode is drawn from."""
 OnFrame = Callable[[RobotBatch, Subgoal], None]
 
 
@@ -59,11 +61,12 @@ def rollout_on_robot(
     spec: RobotSpec,
     tasks: Task,
     form: RewardForm,
-    seeds: Int[np.ndarray, " episode"],
+    starts: Starts,
     on_frame: OnFrame | None = None,
     clock: Clock | None = None,
 ) -> Episodes:
-    """Episodes on robots from x = 0 at rest with reset noise; `tasks` are the active ones, [time, episode].
+    """Episodes on robots from x = 0 at rest; `tasks` are the active ones, [time, episode], and the reset noise of each
+    episode is drawn from its number in `starts`.
 
     Nothing ends early: a fallen robot lies there and keeps scoring. `on_frame` is called at every control step.
     The clock says when the agent decides (thesis mode, 6.3.3); default is every 0.1 s. What is returned stays 0.1 s
@@ -72,7 +75,7 @@ def rollout_on_robot(
     decisions, size = tasks.target.shape
     per_decision = spec.steps_per_decision
     batch = RobotBatch(spec, size)
-    for episode, seed in enumerate(seeds):
+    for episode, seed in enumerate(starts):
         batch.reset(np.random.default_rng(seed), np.arange(size) == episode)
     trail = deque([batch.qpos.copy()], maxlen=per_decision + 1)  # over the last 0.1 s
     clock = clock or EvenClock(per_decision)

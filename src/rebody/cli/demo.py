@@ -13,7 +13,7 @@ from rebody.cli.run import describe, shoot
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, save_results, summary_table
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.evaluate import Trial, take_yardsticks
 from rebody.evaluation.results import EpisodeResult
 from rebody.report import plot_episode, plot_transfer
 from rebody.store import shipped_artifacts
@@ -52,8 +52,9 @@ class Demo:
     def _show(self, trial: Trial, console: Console) -> None:
         specs = hidden_tasks(trial)
         with console.status(f"{3 * len(specs)} episodes of 20 s on the {trial.robot_name}"):
+            yardsticks = take_yardsticks(trial, specs, 1)
             reuse, oracle, idle = (
-                evaluate(replace(trial, agent=agent), specs, 1) for agent in ("reuse", "oracle", "idle")
+                evaluate(replace(trial, agent=agent), specs, 1, yardsticks) for agent in ("reuse", "oracle", "idle")
             )
         console.print(_table(reuse, oracle, idle))
         console.print(summary_table([reuse, oracle, idle]))

@@ -1,6 +1,6 @@
 """`rebody evaluate`."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +10,7 @@ from rich.console import Console
 from rebody.cli.output import check_output
 from rebody.cli.trial import TrialOptions
 from rebody.evaluation import evaluate, save_results, summary_table
+from rebody.evaluation.evaluate import Trial, Yardsticks, take_yardsticks
 from rebody.ranges import Seeds
 from rebody.tasks.task_file import read_tasks
 
@@ -27,13 +28,21 @@ class Evaluate:
     trial: Annotated[TrialOptions, tyro.conf.arg(name="")] = field(default_factory=TrialOptions)
 
     def run(self) -> None:
-        """Evaluate, save, print the table."""
+        """Evaluate, print the table, save."""
         check_output(self.json, "--json", inputs=(self.tasks, self.trial.robot))
         specs = read_tasks(self.tasks)
         trial = self.trial.load()
         console = Console()
         with console.status(f"{len(specs) * self.seeds} episodes of {trial.seconds:g} s"):
-            results = evaluate(trial, specs, self.seeds)
+            yardsticks = take_yardsticks(trial, specs, self.seeds)
+            shown = [evaluate(each, specs, self.seeds, yardsticks) for each in beside_idle(trial, yardsticks)]
+        console.print(summary_table(shown))  # first: it is there even if the disk is full by now
         if self.json is not None:
-            save_results(results, self.json)
-        console.print(summary_table([results]))
+            save_results(shown[0], self.json)
+
+
+def beside_idle(trial: Trial, yardsticks: Yardsticks) -> list[Trial]:
+    """A trial, and what standing still gets in its place, where that is known."""
+    if trial.agent == "idle" or yardsticks.idle is None:
+        return [trial]
+    return [trial, replace(trial, agent="idle", thesis=False)]

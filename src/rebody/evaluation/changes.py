@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from rebody.evaluation.statistics import with_interval
-from rebody.tasks.figures import mean_velocity, tolerance
+from rebody.tasks.figures import mean_of_last_second, tolerance
 from rebody.types import DECISION_DT
 
 if TYPE_CHECKING:
@@ -23,10 +23,13 @@ def summarise_changes(episodes: Sequence["EpisodeResult"]) -> dict[str, Any] | N
     changed = [episode for episode in episodes if _changes_base_task(episode)]
     if not changed:
         return None
+    noticed = [_first_s(episode, base_task_right(episode)) for episode in changed]
+    recovered = [_first_s(episode, _within_tolerance(episode)) for episode in changed]
+    tasks = [episode.task for episode in changed]
     return {
         "episodes": len(changed),
-        "noticed_s": with_interval([_first_s(episode, base_task_right(episode)) for episode in changed], np.median),
-        "recovered_s": with_interval([_first_s(episode, _within_tolerance(episode)) for episode in changed], np.median),
+        "noticed_s": with_interval(noticed, np.median, tasks),
+        "recovered_s": with_interval(recovered, np.median, tasks),
     }
 
 
@@ -53,5 +56,5 @@ def _within_tolerance(episode: "EpisodeResult") -> Bool[np.ndarray, " time"]:
     family = episode.active_family[-1]
     reached = np.array(episode.reached)
     if family == "velocity":
-        reached = mean_velocity(np.array(episode.position_m))
+        reached = mean_of_last_second(reached)
     return np.abs(reached - episode.active_target[-1]) <= tolerance(family)

@@ -8,7 +8,7 @@ import numpy as np
 from rich.table import Table
 
 from rebody.evaluation.changes import base_task_right
-from rebody.evaluation.evaluate import POINT_MASS, Trial, evaluate
+from rebody.evaluation.evaluate import POINT_MASS, Trial, evaluate, take_yardsticks
 from rebody.evaluation.results import EpisodeResult, Results
 from rebody.tasks import FAMILIES, Family
 from rebody.tasks.figures import LAST_S, tolerance
@@ -94,10 +94,11 @@ class Diagnosis:
 
 def diagnose(trial: Trial, specs: list[TaskSpec], seeds: int, tell: Callable[[str], None]) -> Diagnosis:
     """Every agent of the ladder on every task; `tell` hears which one is next. RebodyError as `evaluate`."""
-    results = {}
+    results, yardsticks = {}, None
     for agent in LADDER:
         tell(agent)
-        results[agent] = evaluate(replace(trial, agent=agent), specs, seeds)
+        yardsticks = yardsticks or take_yardsticks(trial, specs, seeds)
+        results[agent] = evaluate(replace(trial, agent=agent), specs, seeds, yardsticks)
     return Diagnosis(results)
 
 

@@ -1,10 +1,12 @@
 """Every task once per evaluation seed, with the oracle's return beside it."""
 
-from dataclasses import dataclass, replace
+import hashlib
+import json
+from dataclasses import asdict, dataclass, replace
 
 import jax
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from rebody.agents.agent import Agent
 from rebody.agents.build import (
@@ -29,7 +31,7 @@ from rebody.agents.parts import (
     LoadedStepPredictor,
     LoadedTracker,
 )
-from rebody.agents.rollout import Episodes, OnFrame, rollout_on_robot, rollout_on_toy
+from rebody.agents.rollout import Episodes, OnFrame, Starts, rollout_on_robot, rollout_on_toy
 from rebody.bodies import RobotSpec
 from rebody.bodies.toys import Toy
 from rebody.control.tracker import slots_of
@@ -101,24 +103,41 @@ class Trial:
         return round(self.seconds / DECISION_DT)
 
 
-@own_jax_settings()
-def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
-    """Judge an agent on every task, once per evaluation seed 0 to `seeds` - 1.
+@dataclass(frozen=True)
+class Yardsticks:
+    """What the same bodies did from the same starts by agents that infer nothing; None where none can be had."""
 
+    oracle: Episodes | None
+    """Told the task."""
+    idle: Episodes | None
+    """Standing still."""
+
+    @property
+    def returns(self) -> dict[str, Float[np.ndarray, " episode"] | None]:
+        """Of each, by its name."""
+        each = {"oracle": self.oracle, "idle": self.idle}
+        return {name: None if e is None else np.asarray(e.reward).sum(axis=0) for name, e in each.items()}
+
+    def of(self, trial: Trial) -> Episodes | None:
+        """Those of a trial whose agent is one of the two, unless it is to be filmed."""
+        return {"oracle": self.oracle, "idle": self.idle}.get(trial.agent) if trial.on_frame is None else None
+
+
+@own_jax_settings()
+def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int, yardsticks: Yardsticks | None = None) -> Results:
+    """Judge an agent on every task, once per evaluation seed 0 to `seeds` - 1, each from a start of its own.
+
+    Yardsticks that were taken before on these tasks and seeds save time.
     RebodyError where module, policies, tasks and robot do not fit together, or there is too much to do at once.
     """
+    yardsticks = yardsticks or take_yardsticks(trial, specs, seeds)
     check_trial(trial, specs)
-    _check_size(trial, len(specs) * seeds)
-    specs = [spec for spec in specs for _ in range(seeds)]
-    episode_seeds = np.tile(np.arange(seeds), len(specs) // seeds)
-    tasks = active_tasks(specs, trial.decisions, DECISION_DT)
+    specs, episode_seeds, tasks = _episodes_of(trial, specs, seeds)
     agent = trial_agent(trial, tasks)
     frozen = frozen_hashes(trial.inference)
-    episodes = run_trial(trial, agent, tasks, episode_seeds)
+    episodes = yardsticks.of(trial) or run_trial(trial, agent, tasks, start_seeds(specs, episode_seeds))
     assert frozen_hashes(trial.inference) == frozen, "what is frozen has changed"
-    oracle = episodes if trial.agent == "oracle" else _run_oracle(trial, tasks, episode_seeds)
     read, clusters = agent.reader(episodes.belief), _clusters(trial, episodes)
-    oracle_returns = None if oracle is None else np.asarray(oracle.reward).sum(axis=0)
     return Results(
         robot=trial.robot_name,
         agent=trial.agent,
@@ -129,8 +148,43 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int) -> Results:
         horizon=trial.horizon,
         thesis=trial.thesis,
         frozen=frozen,
-        episodes=episode_results(specs, episode_seeds, tasks, episodes, read, clusters, oracle_returns),
+        episodes=episode_results(specs, episode_seeds, tasks, episodes, read, clusters, yardsticks.returns),
     )
+
+
+@own_jax_settings()
+def take_yardsticks(trial: Trial, specs: list[TaskSpec], seeds: int) -> Yardsticks:
+    """Oracle and idle in place of a trial's agent: none for a robot without a tracker. RebodyError as `evaluate`."""
+    check_trial(trial, specs)
+    _check_size(trial, len(specs) * seeds)
+    if trial.robot is not None and trial.tracker is None:
+        return Yardsticks(None, None)
+    specs, episode_seeds, tasks = _episodes_of(trial, specs, seeds)
+    stride, starts = 1 if trial.thesis else trial.stride, start_seeds(specs, episode_seeds)
+
+    def run(agent: str) -> Episodes:
+        other = replace(trial, agent=agent, thesis=False, stride=stride, on_frame=None)
+        return run_trial(other, trial_agent(other, tasks), tasks, starts)
+
+    return Yardsticks(run("oracle"), run("idle"))
+
+
+def start_seeds(specs: list[TaskSpec], seeds: Int[np.ndarray, " episode"]) -> list[int]:
+    """What the start of each episode is drawn from: its task and its evaluation seed, whatever else is evaluated.
+
+    Were it the evaluation seed alone, all tasks of a seed would share one start, and be one sample of starts.
+    """
+    texts = [json.dumps([asdict(spec), int(seed)]) for spec, seed in zip(specs, seeds, strict=True)]
+    return [int.from_bytes(hashlib.sha256(text.encode()).digest()[:8]) for text in texts]
+
+
+def _episodes_of(
+    trial: Trial, specs: list[TaskSpec], seeds: int
+) -> tuple[list[TaskSpec], Int[np.ndarray, " episode"], Task]:
+    """Task and evaluation seed of each episode, and the tasks that are active, [time, episode]."""
+    specs = [spec for spec in specs for _ in range(seeds)]
+    episode_seeds = np.tile(np.arange(seeds), len(specs) // seeds)
+    return specs, episode_seeds, active_tasks(specs, trial.decisions, DECISION_DT)
 
 
 def frozen_hashes(inference: Inference) -> dict[str, str]:
@@ -156,23 +210,15 @@ def trial_agent(trial: Trial, tasks: Task) -> Agent:
     )
 
 
-def run_trial(trial: Trial, agent: Agent, tasks: Task, seeds: np.ndarray) -> Episodes:
-    """Episodes as arrays, 0.1 s apart; `tasks` are the active ones, [time, episode]."""
+def run_trial(trial: Trial, agent: Agent, tasks: Task, starts: Starts) -> Episodes:
+    """Episodes as arrays, 0.1 s apart; `tasks` are the active ones, [time, episode], `starts` seeds of the resets."""
     form = trial.contract.reward
     if trial.robot is None:
         episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, form)
     else:
         clock, controller = _clock(trial), trial_controller(trial)
-        episodes = rollout_on_robot(agent, controller, trial.robot, tasks, form, seeds, trial.on_frame, clock)
+        episodes = rollout_on_robot(agent, controller, trial.robot, tasks, form, starts, trial.on_frame, clock)
     return jax.tree.map(np.asarray, episodes)
-
-
-def _run_oracle(trial: Trial, tasks: Task, seeds: np.ndarray) -> Episodes | None:
-    """What the same body would have done, told the task; None for a robot without a tracker."""
-    if trial.robot is not None and trial.tracker is None:
-        return None
-    told = replace(trial, agent="oracle", thesis=False, stride=1 if trial.thesis else trial.stride, on_frame=None)
-    return run_trial(told, trial_agent(told, tasks), tasks, seeds)
 
 
 def _clusters(trial: Trial, episodes: Episodes) -> Int[np.ndarray, "time episode"]:

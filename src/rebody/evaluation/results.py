@@ -1,6 +1,7 @@
 """What an evaluation leaves behind: the versioned JSON that others read."""
 
 import json
+from collections.abc import Hashable
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +18,11 @@ from rebody.tasks.figures import fastest_rise, final_error, final_squared_error,
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import DECISION_DT, AnyArray, Task
 
-VERSION = 1
+VERSION = 2
+
+
+VECTORS = ("target", "active_target", "inferred_target", "subgoal")
+"""Entries of an episode that are vectors in the file."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +34,8 @@ class EpisodeResult:
     seed: int
     switch: dict[str, Any] | None
     time_s: list[float]
-    position_m: list[float]
-    velocity_m_s: list[float]
-    pitch_rad: list[float]
-    vz_max_m_s: list[float]
+    quantities: dict[str, list[float]]
+    """What families compare with their targets, by its name in the global state [m, m/s, rad]."""
     reward: list[float]
     active_family: list[str]
     active_target: list[float]
@@ -45,9 +48,15 @@ class EpisodeResult:
     fell: bool
     return_: float
     oracle_return: float | None
+    idle_return: float | None
     final_error: float
     final_squared_error: float
     ripple_m_s: float
+
+    @property
+    def task(self) -> Hashable:
+        """The same for all episodes of one task, whatever their starts."""
+        return self.family, self.target, str(self.switch)
 
     @property
     def reached(self) -> list[float]:
@@ -60,14 +69,16 @@ class EpisodeResult:
         return list(dict.fromkeys(self.active_family))
 
     def reached_of(self, family: str) -> list[float]:
-        """The number that a family is about, after each decision [m, m/s, rad]."""
-        of_each = self.position_m, self.velocity_m_s, self.pitch_rad, self.vz_max_m_s
-        return of_each[family_index(family)]
+        """The number that a family is about, after each decision [m, m/s, rad]: of a jump the largest of a second."""
+        quantity = self.quantities[FAMILIES[family_index(family)].field]
+        return fastest_rise(np.array(quantity)).tolist() if family == "jump" else quantity
 
     def to_json(self) -> dict[str, Any]:
         """Under the names of the file format."""
         entry = asdict(self)
         entry["return"] = entry.pop("return_")
+        for name in VECTORS:
+            entry[name] = _vectors(entry[name])
         if self.switch is None:
             del entry["switch"]
         return entry
@@ -128,9 +139,11 @@ def episode_results(
     episodes: Episodes,
     read: tuple[Int[AnyArray, "time episode"], Float[AnyArray, "time episode"]],
     cluster: Int[np.ndarray, "time episode"],
-    oracle_returns: Float[np.ndarray, " episode"] | None,
+    returns: dict[str, Float[np.ndarray, " episode"] | None],
 ) -> list[EpisodeResult]:
-    """One result per episode, from arrays [time, episode]; `read` is what the probe says, `cluster` the mixture."""
+    """One result per episode, from arrays [time, episode]; `read` is what the probe says, `cluster` the mixture's
+    component, `returns` has those of the oracle and of an idle agent where there are any.
+    """
     names = np.array([family.name for family in FAMILIES])
     inferred_family, inferred_target = (np.asarray(part) for part in read)
     state = episodes.state
@@ -145,10 +158,7 @@ def episode_results(
                 seed=int(seeds[i]),
                 switch=None if spec.switch is None else asdict(spec.switch),
                 time_s=_floats(DECISION_DT * np.arange(1, len(state.x) + 1)),
-                position_m=_floats(state.x[:, i]),
-                velocity_m_s=_floats(state.vx[:, i]),
-                pitch_rad=_floats(state.pitch[:, i]),
-                vz_max_m_s=_floats(fastest_rise(np.asarray(state.vz[:, i], float))),
+                quantities={family.field: _floats(getattr(state, family.field)[:, i]) for family in FAMILIES},
                 reward=_floats(episodes.reward[:, i]),
                 active_family=names[np.asarray(tasks.family[:, i])].tolist(),
                 active_target=_floats(tasks.target[:, i]),
@@ -160,13 +170,25 @@ def episode_results(
                 subgoal=[None if np.isnan(value) else value for value in _floats(episodes.subgoal.value[:, i])],
                 fell=bool(episodes.fell[i]),
                 return_=float(np.sum(episodes.reward[:, i])),
-                oracle_return=None if oracle_returns is None else float(oracle_returns[i]),
+                oracle_return=_return_of(returns["oracle"], i),
+                idle_return=_return_of(returns["idle"], i),
                 final_error=float(errors[i]),
                 final_squared_error=float(squared_errors[i]),
                 ripple_m_s=float(ripples[i]),
             )
         )
     return results
+
+
+def _return_of(returns: Float[np.ndarray, " episode"] | None, episode: int) -> float | None:
+    return None if returns is None else float(returns[episode])
+
+
+def _vectors(value: Any) -> Any:
+    """Every number as a vector of one."""
+    if isinstance(value, list):
+        return [_vectors(entry) for entry in value]
+    return None if value is None else [value]
 
 
 def _floats(values: Any) -> list[float]:

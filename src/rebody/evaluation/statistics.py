@@ -1,5 +1,7 @@
 """Statistics with their bootstrap intervals."""
 
+from collections import defaultdict
+from collections.abc import Hashable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,24 +16,41 @@ def regret(returns: np.ndarray) -> float:
     return float((possible - reached) / abs(possible))
 
 
+def share_of_oracle(returns: np.ndarray) -> float:
+    """Of rows (return, oracle return, idle return): how much of what knowing the task brings, 0 to 1."""
+    reached, possible, nothing = returns.sum(axis=0)
+    return float((reached - nothing) / (possible - nothing))
+
+
 def percentile_95(values: np.ndarray) -> float:
     """The 95th percentile."""
     return float(np.percentile(values, 95))
 
 
-def with_interval(values: Any, statistic: Any) -> dict[str, float]:
-    """A statistic over the rows of `values`, with its 95 % bootstrap interval (percentile method)."""
+def with_interval(values: Any, statistic: Any, tasks: Sequence[Hashable] | None = None) -> dict[str, float]:
+    """A statistic over the rows of `values`, with its 95 % bootstrap interval (percentile method).
+
+    `tasks` says which task each row is of. Tasks are drawn anew, each with all of its rows: episodes of one task from
+    several starts are no independent sample. By default every row is a task of its own.
+    """
     values = np.asarray(values, float)
     value = float(statistic(values))
-    if len(values) < 2 or np.ptp(values, axis=0).max() == 0:
+    of_tasks = _rows_of_tasks(range(len(values)) if tasks is None else tasks)
+    if len(of_tasks) < 2 or np.ptp(values, axis=0).max() == 0:
         return {"value": value, "low": value, "high": value}
-    rows = np.arange(len(values))
     interval = scipy.stats.bootstrap(
-        (rows,),
-        lambda chosen: statistic(values[chosen]),
+        (np.arange(len(of_tasks)),),
+        lambda chosen: statistic(values[np.concatenate([of_tasks[i] for i in chosen])]),
         n_resamples=RESAMPLES,
         vectorized=False,
         method="percentile",
         rng=np.random.default_rng(0),
     ).confidence_interval
     return {"value": value, "low": float(interval.low), "high": float(interval.high)}
+
+
+def _rows_of_tasks(tasks: Iterable[Hashable]) -> list[list[int]]:
+    rows: defaultdict[Hashable, list[int]] = defaultdict(list)
+    for row, task in enumerate(tasks):
+        rows[task].append(row)
+    return list(rows.values())

@@ -18,12 +18,16 @@ FIGURES = (
 CHANGES = ((r"base task right after \[s]", "noticed_s"), (r"within tolerance after \[s]", "recovered_s"))
 """Of tasks that change in mid-episode."""
 SHARES = ("within_tolerance", "fell")
+CAPTION = (
+    r"value \[95 % bootstrap interval over tasks]; seeds: smallest and largest median of an evaluation seed; "
+    "share: (return - idle) / (oracle - idle)"
+)
 
 
 def summary_table(results: Sequence[Results]) -> Table:
     """A column per evaluation, a row per figure, each with its 95 % interval."""
     summaries = [result.summary for result in results]
-    table = Table(caption=r"value \[95 % bootstrap interval over episodes]", caption_justify="left")
+    table = Table(caption=CAPTION, caption_justify="left")
     table.add_column("")
     for result in results:
         table.add_column(f"{result.robot}, {result.agent}", justify="right")
@@ -35,13 +39,20 @@ def summary_table(results: Sequence[Results]) -> Table:
         for name, key in FIGURES:
             unit = rf" \[{family.unit}]" if key.endswith("_error") else ""
             table.add_row(f"{family.name}: {name}{unit}", *(_cell(key, of.get(key)) for of in ofs))
+        if any(len(of.get("median_error_by_seed", ())) > 1 for of in ofs):
+            table.add_row(rf"{family.name}: seeds \[{family.unit}]", *(_spread(of) for of in ofs))
     changes = [summary["changes"] for summary in summaries]
     if any(changes):
         for name, key in CHANGES:
             table.add_row(f"change: {name}", *(_cell(key, change and change[key]) for change in changes))
-    for key in ("fell", "regret"):
+    for key in ("fell", "regret", "share"):
         table.add_row(key, *(_cell(key, summary[key]) for summary in summaries))
     return table
+
+
+def _spread(of: dict[str, Any]) -> str:
+    medians = of["median_error_by_seed"].values() if of else ()
+    return f"{min(medians):.3f} to {max(medians):.3f}" if medians else "-"
 
 
 def _cell(key: str, figure: dict[str, Any] | None) -> str:

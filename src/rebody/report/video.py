@@ -70,13 +70,13 @@ def _ffmpeg(path: Path) -> Iterator[Callable[[np.ndarray | None], None]]:
     size = (WIDTH, HEIGHT + PLOT_HEIGHT)
     writer = imageio_ffmpeg.write_frames(str(path), size, fps=FRAMES_PER_S, macro_block_size=1)
 
+    failed = f"ffmpeg could not write a video into {path.parent}. Is the disk full? {MENDING_FFMPEG}"
+
     def write(frame: np.ndarray | None) -> None:
         try:
             writer.send(frame)
         except (OSError, RuntimeError, LookupError) as error:  # it ended, or cannot encode
-            raise RebodyError(
-                f"ffmpeg could not write a video into {path.parent}. Is the disk full? {MENDING_FFMPEG}"
-            ) from error
+            raise RebodyError(failed) from error
 
     try:
         with warnings.catch_warnings():
@@ -86,6 +86,10 @@ def _ffmpeg(path: Path) -> Iterator[Callable[[np.ndarray | None], None]]:
         yield write
     finally:
         writer.close()
+    try:
+        imageio_ffmpeg.count_frames_and_secs(str(path))
+    except RuntimeError as error:  # of a file that it could not finish, imageio-ffmpeg says nothing
+        raise RebodyError(failed) from error
 
 
 def _frames(spec: RobotSpec, poses: list[Float[np.ndarray, " nq"]], episode: EpisodeResult):

@@ -45,7 +45,7 @@ def save_checkpoint(folder: Path, state: Any, meta: dict[str, Any]) -> None:
         sync(folder)
     except (OSError, SafetensorError) as error:  # of a full disk safetensors says so in its own error
         raise RebodyError(
-            f"the checkpoint {folder / FILE} cannot be written: {reason(error)}. The one before is still there: "
+            f"the checkpoint {folder / FILE} cannot be written: {reason(error)}. Any earlier one is whole: "
             "mend this, then go on with --resume."
         ) from error
     finally:

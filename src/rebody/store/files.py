@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -75,12 +76,21 @@ def written_whole(path: Path) -> Iterator[Path]:
         unfinished.unlink(missing_ok=True)  # never written through, should it be a link
         yield unfinished
         sync(unfinished)
-        os.replace(unfinished, target)
+        _replace(target, unfinished)
     except (OSError, SafetensorError) as error:
         raise RebodyError(f"{path} cannot be written: {reason(error)}.") from error
     finally:
         with suppress(OSError):
             unfinished.unlink(missing_ok=True)
+
+
+def _replace(target: Path, new: Path) -> None:
+    try:
+        os.replace(new, target)
+    except OSError as error:
+        if error.errno != errno.EBUSY:
+            raise
+        shutil.copyfile(new, target)  # a file that is a mount point of its own, as in a container
 
 
 def sync(path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import IO
 
 from rebody.errors import RebodyError
-from rebody.store.files import reason, sync, written_whole
+from rebody.store.files import MB, reason, sync, written_whole
 
 try:
     import fcntl
@@ -54,6 +54,16 @@ def try_folder(folder: Path) -> None:
     finally:
         with suppress(OSError):
             probe.unlink(missing_ok=True)
+
+
+def check_space(folder: Path, size: int) -> None:
+    """RebodyError if the disk that a folder is on has less room than so many bytes."""
+    free = shutil.disk_usage(folder).free
+    if free < size:
+        raise RebodyError(
+            f"the folder {folder} needs {size / MB:.1f} MB, and its disk has {free / MB:.1f} MB left. "
+            "Make room, or choose another folder."
+        )
 
 
 def replace_together(folder: Path, content: Mapping[str, bytes], commit: str) -> None:

@@ -62,6 +62,13 @@ def mean_velocity(position: Series, start: float = 0.0) -> Series:
     return (position - before) / MEAN_S
 
 
+def mean_of_last_second(velocity: Series) -> Series:
+    """The mean velocity of the last second [m/s]; before the first decision a body stands still."""
+    steps = round(MEAN_S / DECISION_DT)
+    padded = np.concatenate([np.zeros((steps - 1, *velocity.shape[1:])), velocity])
+    return np.lib.stride_tricks.sliding_window_view(padded, steps, axis=0).mean(axis=-1)
+
+
 def fastest_rise(vz: Series) -> Series:
     """The largest vertical speed of the last second [m/s]."""
     steps = round(JUMP_S / DECISION_DT)

@@ -22,6 +22,7 @@ from rebody.errors import RebodyError
 from rebody.store import holds_checkpoint, load_checkpoint, recover, save_checkpoint, take_folder, tree_to_arrays
 from rebody.store.artifact import MANIFEST
 from rebody.store.checkpoint import FOLDER
+from rebody.store.folders import check_space
 from rebody.training.curves import Curves
 from rebody.training.progress import Metrics, progress
 
@@ -101,6 +102,9 @@ class Run:
         self._check_folder()  # again: now nobody else changes it
         recover(self.out)
         found = load_checkpoint(self._checkpoint, state, self._check_settings) if self.resume else None
+        # a checkpoint is written beside the one before it
+        size = sum(array.nbytes for array in tree_to_arrays(state).values())
+        check_space(self.out, size if found else 2 * size)
         if found is None:
             return state
         state, meta = found

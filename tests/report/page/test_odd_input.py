@@ -167,7 +167,7 @@ def _with_latents(*rows):
         (_with_latents([]), "Latents are empty or of unlike lengths"),
         (_with_latents([1e300, -1e300]), "goal +2.5"),
         (lambda episode: episode.update(final_error=1e300), "goal +2.5"),
-        (lambda episode: episode.update(position_m=[1e300] * len(episode["position_m"])), "goal +2.5"),
+        (lambda episode: episode["quantities"].update(x=[1e300] * len(episode["time_s"])), "goal +2.5"),
         (lambda episode: episode.update(switch={"at_s": "1", "target": None}), "goal +2.5, then goal +2.5"),
         (lambda episode: episode.update(switch={}), "goal +2.5, then goal +2.5"),
     ],

@@ -1,6 +1,7 @@
 """The page: it holds what was given, and asks nobody for anything."""
 
 import base64
+import os
 import re
 from html.parser import HTMLParser
 
@@ -164,6 +165,25 @@ def test_what_is_no_run_is_refused(make, tmp_path):
     make(tmp_path / "thing")
     with pytest.raises(RebodyError, match="rebody evaluate --json"):
         find(str(tmp_path / "thing"))
+
+
+@pytest.mark.parametrize("name", ["figure.png", "film.mp4", "results.json"])
+def test_links_that_leave_the_folder_are_refused(name, written, tmp_path):
+    (tmp_path / "secret").write_text("not for this page")
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "reuse.json").write_bytes((written.demo / "reuse.json").read_bytes())
+    (folder / name).symlink_to(tmp_path / "secret")
+    with pytest.raises(RebodyError, match=f"{name} is a link that leaves {folder}"):
+        find(str(folder))
+
+
+def test_pipes_are_refused_and_in_a_folder_not_looked_at(written, tmp_path):
+    os.mkfifo(tmp_path / "results.json")
+    with pytest.raises(RebodyError, match="is a pipe"):
+        find(str(tmp_path / "results.json"))
+    (tmp_path / "reuse.json").write_bytes((written.demo / "reuse.json").read_bytes())
+    assert list(find(str(tmp_path)).results) == [tmp_path / "reuse.json"]
 
 
 def test_a_damaged_artifact_is_refused(artifact, tmp_path):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import safetensors.numpy
 
-from rebody.evaluation.evaluate import Trial, check_trial, run_trial, trial_agent
+from rebody.evaluation.evaluate import Trial, check_trial, run_trial, start_seeds, trial_agent
 from rebody.store import load_artifact
 from rebody.store.files import written_whole
 from rebody.tasks.task_file import TaskSpec, active_tasks
@@ -58,7 +58,7 @@ def trajectories(trial: Trial, specs: list[TaskSpec]) -> Data:
     """
     check_trial(trial, specs)
     tasks = active_tasks(specs, trial.decisions, DECISION_DT)
-    episodes = run_trial(trial, trial_agent(trial, tasks), tasks, np.zeros(len(specs), int))
+    episodes = run_trial(trial, trial_agent(trial, tasks), tasks, start_seeds(specs, np.zeros(len(specs), int)))
     every = -(-trial.decisions // POINTS)
     kept = np.arange(every - 1, trial.decisions, every)
     decision_s = trial.stride * trial.robot.control_dt if trial.robot and trial.thesis else DECISION_DT
