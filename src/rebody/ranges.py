@@ -56,6 +56,12 @@ def check_ranges(settings: Any) -> None:
                 raise RebodyError(f"{option} must be {wanted}, not {number!r}.")
 
 
+def check_seed(seed: Any) -> None:
+    """RebodyError where a seed is no whole number of 32 bits."""
+    if not isinstance(seed, int) or isinstance(seed, bool) or not 0 <= seed < 2**32:
+        raise RebodyError(f"a seed must be a whole number of at least 0 and less than {2**32:,}, not {seed!r}.")
+
+
 def _fields_of(settings: Any, prefix: str) -> Iterator[tuple[str, Any, Any]]:
     """(option, value, annotation) of every field, those of settings within settings too."""
     annotations = get_type_hints(type(settings), include_extras=True)

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from rebody.errors import RebodyError
+from rebody.ranges import check_seed
 from rebody.store import holds_checkpoint, load_checkpoint, recover, save_checkpoint, take_folder, tree_to_arrays
 from rebody.store.artifact import MANIFEST
 from rebody.store.checkpoint import FOLDER
@@ -61,6 +62,7 @@ class Run:
         But for those called `length`, numbers of iterations that follow one another: what is still to come of them may
         change. With `finish` no iteration is taken: what was done is all.
         """
+        check_seed(settings.get("seed", 0))
         self.out = out
         self.settings = json.loads(json.dumps(settings))
         self.resume = resume or finish
