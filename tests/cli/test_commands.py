@@ -8,7 +8,7 @@ import pytest
 from rebody.cli.commands import COMMANDS
 from rebody.cli.main import run
 
-HEAVY = "{'jax', 'mujoco', 'matplotlib', 'numpy', 'gymnasium', 'rebody.training'}"
+HEAVY = "{'jax', 'mujoco', 'matplotlib', 'rebody.training'}"
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)

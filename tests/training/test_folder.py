@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 import safetensors.numpy
 from safetensors import SafetensorError
-from tensorboardX.event_file_writer import EventsWriter
+from tensorboardX.record_writer import RecordWriter
 
 from rebody.errors import RebodyError
 from rebody.store import take_folder
@@ -84,8 +84,8 @@ def test_a_full_disk_is_one_message_and_the_checkpoint_stays(
             error = SafetensorError("Error while serializing: I/O error: No space left on device (os error 28)")
             patched.setattr(safetensors.numpy, "save_file", partial(full, error, safetensors.numpy.save_file))
         else:
-            error, real = OSError(28, "No space left on device"), EventsWriter.flush
-            patched.setattr(EventsWriter, "flush", lambda self: full(error, real, self))
+            error, real = OSError(28, "No space left on device"), RecordWriter.flush
+            patched.setattr(RecordWriter, "flush", lambda self: full(error, real, self))
         assert tracker(out) == 2
     said = capsys.readouterr().err
     assert "cannot be written" in said

@@ -1,12 +1,13 @@
 """Curves for TensorBoard."""
 
+import socket
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from tensorboardX.event_file_writer import EventsWriter
 from tensorboardX.proto.event_pb2 import Event, SessionLog  # pyright: ignore[reportAttributeAccessIssue] (generated)
+from tensorboardX.record_writer import RecordWriter
 from tensorboardX.summary import scalar
 
 from rebody.errors import RebodyError
@@ -25,7 +26,8 @@ class Curves:
         self._folder = folder
         with self._heard():
             folder.mkdir(parents=True, exist_ok=True)
-            self._writer = EventsWriter(str(folder / "events"))
+            self._writer = RecordWriter(str(folder / f"events.out.tfevents.{int(time.time())}.{socket.gethostname()}"))
+        self._write(Event(file_version="brain.Event:2"))
         self._write(Event(step=first_step, session_log=SessionLog(status=SessionLog.START)))
 
     def add(self, values: Mapping[str, float], step: int) -> None:
@@ -39,14 +41,14 @@ class Curves:
             self._writer.flush()
 
     def close(self) -> None:
-        """Flush, and write no more."""
+        """Flush, and write no more; the file is closed even where that fails."""
         with self._heard():
             self._writer.close()
 
     def _write(self, event: Event) -> None:
         event.wall_time = time.time()
         with self._heard():
-            self._writer.write_event(event)
+            self._writer.write(event.SerializeToString())
 
     @contextmanager
     def _heard(self) -> Iterator[None]:

@@ -113,7 +113,7 @@ def test_those_who_wander_hold_their_actions(episodes):
 
 
 def test_episodes_start_anywhere_at_any_speed(config, state):
-    wide = replace(config, episodes=400, decisions=1, start=(5.0, 2.0))
+    wide = replace(config, episodes=400, decisions=config.inference.window, start=(5.0, 2.0))
     started = collect(state.module, state.sac.actor, TOY, wide, roles(400, True), jax.random.key(2)).state
     for begun, limit in ((started.x[:, 0], 5.0), (started.vx[:, 0], 2.0)):
         assert 0.97 * limit < np.abs(begun).max() <= limit
@@ -122,7 +122,8 @@ def test_episodes_start_anywhere_at_any_speed(config, state):
 
 
 def test_disturbed_episodes_may_start_farther_out(config, state):
-    wide = replace(config, episodes=400, decisions=1, start=(5.0, 2.0), disturbed_start=(20.0, 1.0))
+    decisions = config.inference.window
+    wide = replace(config, episodes=400, decisions=decisions, start=(5.0, 2.0), disturbed_start=(20.0, 1.0))
     started = collect(state.module, state.sac.actor, TOY, wide, roles(400, True), jax.random.key(2)).state
     for half, limits in ((slice(0, 200), (5.0, 2.0)), (slice(200, 400), (20.0, 1.0))):
         for begun, limit in zip((started.x[half, 0], started.vx[half, 0]), limits, strict=True):
