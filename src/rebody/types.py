@@ -38,9 +38,10 @@ class GlobalState(eqx.Module):
     vz: Float[AnyArray, "*batch"]  # m/s
     pitch_rate: Float[AnyArray, "*batch"]  # rad/s
 
-    def select(self, fields: tuple[str, ...]) -> Float[jax.Array, "*batch field"]:
-        """The named fields, stacked on a last axis."""
-        return jax.numpy.stack([getattr(self, name) for name in fields], axis=-1)
+    def select(self, fields: tuple[str, ...]) -> Float[AnyArray, "*batch field"]:
+        """The named fields, stacked on a last axis; of NumPy where they are."""
+        chosen = [getattr(self, name) for name in fields]
+        return (np if isinstance(chosen[0], np.ndarray) else jax.numpy).stack(chosen, axis=-1)
 
 
 class Task(eqx.Module):

@@ -53,7 +53,7 @@ class RewardWatch:
     def hear(self, previous: GlobalState, state: GlobalState, reward: float) -> bool:
         """Whether a reward can be believed: some target of some family could have paid it, and it is not stuck."""
         self._decisions += 1
-        moved = {family.name: _moved(family.field, previous, state) for family in self._families}
+        moved = {family.name: _moved(family.quantity.name, previous, state) for family in self._families}
         self._count_same(reward, all(before != after for before, after in moved.values()))
         bounds = self._bounds(moved)
         if _is_beyond(reward, bounds):

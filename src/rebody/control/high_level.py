@@ -87,7 +87,7 @@ class TaskCode(eqx.Module):
     @property
     def places(self) -> Places:
         """The field of each family, and its scale."""
-        return tuple((FAMILIES[family].field, scale) for family, scale in self.scales)
+        return tuple((FAMILIES[family].quantity.name, scale) for family, scale in self.scales)
 
     def __call__(self, task: Task) -> Belief:
         """One-hot of the family, then the same times the scaled target; mean [*batch, 2 families]."""
@@ -99,5 +99,5 @@ class TaskCode(eqx.Module):
 
 def told_code(places: Places) -> TaskCode:
     """How a task is put to a policy that is told it: as a belief without doubt that speaks of these places."""
-    family_of = {family.field: index for index, family in enumerate(FAMILIES)}
+    family_of = {family.quantity.name: index for index, family in enumerate(FAMILIES)}
     return TaskCode(tuple((family_of[field], unit) for field, unit in places))

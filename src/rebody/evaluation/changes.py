@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from rebody.evaluation.statistics import with_interval
-from rebody.tasks.figures import mean_of_last_second, tolerance
+from rebody.tasks.figures import tolerance
 from rebody.types import DECISION_DT
 
 if TYPE_CHECKING:
@@ -53,8 +53,4 @@ def _first_s(episode: "EpisodeResult", holds: Bool[np.ndarray, " time"]) -> floa
 
 
 def _within_tolerance(episode: "EpisodeResult") -> Bool[np.ndarray, " time"]:
-    family = episode.active_family[-1]
-    reached = np.array(episode.reached)
-    if family == "velocity":
-        reached = mean_of_last_second(reached)
-    return np.abs(reached - episode.active_target[-1]) <= tolerance(family)
+    return episode.missed() <= tolerance(episode.active_family[-1])

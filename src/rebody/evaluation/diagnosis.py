@@ -10,7 +10,7 @@ from rich.table import Table
 from rebody.evaluation.changes import base_task_right
 from rebody.evaluation.evaluate import POINT_MASS, Trial, evaluate, take_yardsticks
 from rebody.evaluation.results import EpisodeResult, Results
-from rebody.tasks import FAMILIES, Family
+from rebody.tasks import FAMILIES, Family, family_named
 from rebody.tasks.figures import LAST_S, tolerance
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import DECISION_DT
@@ -121,14 +121,15 @@ def _conditions(results: Results) -> Hashable:
 def shares_of(episode: EpisodeResult) -> Shares:
     """Means over the last 2 s; a velocity's are of its mean, so that a gait does not count."""
     family, target = episode.active_family[-1], episode.active_target[-1]
+    difference = family_named(family).quantity.difference
     read, reached = (float(np.mean(of[-_LAST:])) for of in (episode.inferred_target, episode.reached))
     subgoal = np.mean([np.nan if value is None else value for value in episode.subgoal[-_LAST:]])
     return Shares(
         base_task_right=episode.inferred_family[-1] == family and read * target > 0,
         slot_right=episode.subgoal_family[-1] == family,
-        read=float(abs(read - target)),
-        high_level=float(abs(subgoal - read)),
-        tracker=float(abs(reached - subgoal)),
+        read=float(abs(difference(read, target))),
+        high_level=float(abs(difference(subgoal, read))),
+        tracker=float(abs(difference(reached, subgoal))),
     )
 
 

@@ -8,7 +8,7 @@ import msgspec
 from rebody.errors import RebodyError
 from rebody.evaluation.results import VECTORS, VERSION, EpisodeResult, Results
 from rebody.store.files import DATA, read_file
-from rebody.tasks import FAMILIES, family_index
+from rebody.tasks import family_named
 
 WANTED = "such a file is written by `rebody evaluate --json`"
 
@@ -94,5 +94,5 @@ def _check_series(episode: EpisodeResult) -> None:
     if uneven := [name for name, value in series.items() if len(value) != decisions or not value]:
         raise RebodyError(f"an episode of {decisions} decisions has a '{uneven[0]}' of {len(series[uneven[0]])}")
     for family in {*episode.active_family, *episode.inferred_family}:
-        if FAMILIES[family_index(family)].field not in episode.quantities:
+        if family_named(family).quantity.name not in episode.quantities:
             raise RebodyError(f"an episode with the family '{family}' lacks its quantity")

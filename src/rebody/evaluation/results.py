@@ -13,8 +13,8 @@ from jaxtyping import Float, Int
 from rebody.agents.rollout import Episodes
 from rebody.evaluation.summary import summarise
 from rebody.store.files import written_whole
-from rebody.tasks import FAMILIES, family_index
-from rebody.tasks.figures import fastest_rise, final_error, final_squared_error, ripple
+from rebody.tasks import FAMILIES, family_named
+from rebody.tasks.figures import final_error, final_squared_error, ripple, settled
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import DECISION_DT, AnyArray, Task
 
@@ -70,8 +70,15 @@ class EpisodeResult:
 
     def reached_of(self, family: str) -> list[float]:
         """The number that a family is about, after each decision [m, m/s, rad]: of a jump the largest of a second."""
-        quantity = self.quantities[FAMILIES[family_index(family)].field]
-        return fastest_rise(np.array(quantity)).tolist() if family == "jump" else quantity
+        asked = family_named(family)
+        quantity = self.quantities[asked.quantity.name]
+        return settled(asked, np.array(quantity)).tolist() if asked.settle == "largest of 1 s" else quantity
+
+    def missed(self) -> Float[np.ndarray, " time"]:
+        """How far what the last family settles on is from its target, after each decision [m, m/s, rad]."""
+        family = family_named(self.active_family[-1])
+        judged = settled(family, np.array(self.quantities[family.quantity.name]))
+        return np.abs(family.quantity.difference(judged, self.active_target[-1]))
 
     def to_json(self) -> dict[str, Any]:
         """Under the names of the file format."""
@@ -149,6 +156,7 @@ def episode_results(
     state = episodes.state
     last = Task(tasks.family[-1], tasks.target[-1])
     errors, squared_errors, ripples = final_error(last, state), final_squared_error(last, state), ripple(state)
+    quantities = {family.quantity.name: family.quantity.read(state)[..., 0] for family in FAMILIES}
     results = []
     for i, spec in enumerate(specs):
         results.append(
@@ -158,7 +166,7 @@ def episode_results(
                 seed=int(seeds[i]),
                 switch=None if spec.switch is None else asdict(spec.switch),
                 time_s=_floats(DECISION_DT * np.arange(1, len(state.x) + 1)),
-                quantities={family.field: _floats(getattr(state, family.field)[:, i]) for family in FAMILIES},
+                quantities={quantity: _floats(values[:, i]) for quantity, values in quantities.items()},
                 reward=_floats(episodes.reward[:, i]),
                 active_family=names[np.asarray(tasks.family[:, i])].tolist(),
                 active_target=_floats(tasks.target[:, i]),

@@ -43,7 +43,7 @@ def plot_beliefs(run: BeliefOverTime, path: Path) -> None:
 
 def _reached(axes: Axes, run: BeliefOverTime, family: Family) -> None:
     is_believed = run.believes(family.name)
-    reached = run.decisions.fields.get(family.field, np.zeros(0))  # a module may hear of it by the reward alone
+    reached = run.decisions.fields.get(family.quantity.name, np.zeros(0))  # a module may hear of it by the reward alone
     believed = run.targets[is_believed]
     axes.plot(run.time_s[is_believed], believed, ".", color=_colour(family.name), label=f"believed {family.name}")
     if reached.size:
@@ -51,7 +51,7 @@ def _reached(axes: Axes, run: BeliefOverTime, family: Family) -> None:
     usual = np.percentile(believed, (OUTLIERS, 100 - OUTLIERS)) if believed.size else []
     shown = [*reached, *usual, 0.0]
     margin = 0.1 * max(np.ptp(shown), family.tolerance)
-    axes.set(ylabel=COLUMNS[family.field], ylim=(min(shown) - margin, max(shown) + margin))
+    axes.set(ylabel=COLUMNS[family.quantity.name], ylim=(min(shown) - margin, max(shown) + margin))
     axes.legend(frameon=False, fontsize=8, loc="upper right")
 
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from rebody.evaluation.results import EpisodeResult, Results
 from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TASKS, TRUTH, as_text, figure
-from rebody.tasks import FAMILIES, family_index
+from rebody.tasks import family_named
 
 FAMILY_COLOURS = (MOTION, BELIEF, IDLE, ORACLE)
 
@@ -136,4 +136,4 @@ def draw_errors(axes: Axes, episodes: list[EpisodeResult], **style: Any) -> None
 
 
 def _unit(family: str) -> str:
-    return FAMILIES[family_index(family)].unit
+    return family_named(family).unit

@@ -12,9 +12,11 @@ from rebody.tasks.families import (
     achieved_by_way_of,
     base_task,
     family_index,
+    family_named,
     family_names,
     reward,
 )
+from rebody.tasks.quantities import Quantity
 from rebody.tasks.sampling import BaseTask, TaskDistribution
 
 __all__ = [
@@ -25,12 +27,14 @@ __all__ = [
     "VELOCITY",
     "BaseTask",
     "Family",
+    "Quantity",
     "RewardForm",
     "TaskDistribution",
     "achieved",
     "achieved_by_way_of",
     "base_task",
     "family_index",
+    "family_named",
     "family_names",
     "reward",
 ]

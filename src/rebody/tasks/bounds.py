@@ -19,6 +19,7 @@ def payable(
 
     `moved` are the ends between which the family's quantity was meanwhile [m, m/s, rad]. In the target, rewards are
     monotonic between its ends, the ends of `moved`, 0 and the family's floor either way: so one of these is the worst.
+    Of an angle, which may be near a target the other way round, the bounds are wider than they need be.
     """
     low, high = sorted(moved)
     first, last = (float(np.clip(end, -_FAR, _FAR)) for end in targets)
@@ -26,5 +27,5 @@ def payable(
     errors = np.abs(asked[:, None] - [low, high])
     scale = np.maximum(np.abs(asked), family.floor)[:, None] if form == "relative" else 1.0
     pay = -errors / scale
-    is_met = max(low, first) <= min(high, last)
+    is_met = family.quantity.wraps or max(low, first) <= min(high, last)
     return float(pay.min()), 0.0 if is_met else float(pay.max())

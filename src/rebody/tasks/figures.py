@@ -3,74 +3,75 @@
 import numpy as np
 from jaxtyping import Float
 
-from rebody.tasks.families import FAMILIES, JUMP, VELOCITY, family_index
+from rebody.tasks.families import FAMILIES, Family, family_named
 from rebody.types import DECISION_DT, GlobalState, Task
 
 LAST_S = 2.0
 """The final error is a mean over this many seconds at the end."""
-MEAN_S = 1.0
-"""Velocities are judged by the mean over this many seconds."""
-JUMP_S = 1.0
-"""Jumps are judged by the largest vertical speed of this many seconds: nobody can hold one."""
+SECOND = round(1.0 / DECISION_DT)
+"""Decisions of the second that a family may be judged by."""
 
 Series = Float[np.ndarray, "time *episode"]
 
 
-def final_error(task: Task, state: GlobalState, start: float = 0.0) -> Float[np.ndarray, "*episode"]:
-    """Mean over the last 2 s of |y - target| [m, m/s, rad]; a velocity is the displacement over 1 s, a jump the largest
-    vertical speed of 1 s.
+def final_error(task: Task, state: GlobalState) -> Float[np.ndarray, "*episode"]:
+    """Mean over the last 2 s of |difference| [m, m/s, rad] between target and quantity, as its family settles it: of a
+    velocity the mean of 1 s, of a jump the largest of 1 s.
 
-    `task` is the last one, [*episode]; `state` that after each decision, [time, *episode]; `start` is x before
-    the first [m].
+    `task` is the last one, [*episode]; `state` that after each decision, [time, *episode].
     """
-    judged = [np.asarray(getattr(state, family.field), float) for family in FAMILIES]
-    judged[VELOCITY] = mean_velocity(np.asarray(state.x, float), start)
-    judged[JUMP] = fastest_rise(np.asarray(state.vz, float))
-    last = round(LAST_S / DECISION_DT)
-    return np.abs(_of_family(task, judged)[-last:] - task.target).mean(axis=0)
+    return _missed(task, state, round(LAST_S / DECISION_DT), settles=True).mean(axis=0)
 
 
 def final_squared_error(task: Task, state: GlobalState) -> Float[np.ndarray, "*episode"]:
-    """Squared error at the last decision [m^2, (m/s)^2, rad^2], to compare with ReMAP."""
-    achieved = [np.asarray(getattr(state, family.field), float)[-1:] for family in FAMILIES]
-    achieved[JUMP] = fastest_rise(np.asarray(state.vz, float))[-1:]
-    return (_of_family(task, achieved)[-1] - task.target) ** 2
+    """Squared error at the last decision [m^2, (m/s)^2, rad^2], to compare with ReMAP; velocities at that decision."""
+    return _missed(task, state, 1, settles=False)[-1] ** 2
 
 
 def ripple(state: GlobalState) -> Float[np.ndarray, "*episode"]:
     """Std over the last 2 s of the 0.1 s velocity about its 1 s mean [m/s]; states are [time, *episode]."""
-    last = round(LAST_S / DECISION_DT)
-    position, velocity = np.asarray(state.x, float), np.asarray(state.vx, float)
-    return np.std((velocity - mean_velocity(position))[-last:], axis=0)
+    velocity = np.asarray(state.vx, float)
+    return np.std((velocity - mean_of_last_second(velocity))[-round(LAST_S / DECISION_DT) :], axis=0)
 
 
 def tolerance(family: str) -> float:
     """Within which final error an episode counts as solved [m, m/s, rad]."""
-    return FAMILIES[family_index(family)].tolerance
+    return family_named(family).tolerance
 
 
-def _of_family(task: Task, by_family: list[Series]) -> Series:
-    family = np.asarray(task.family)
-    chosen = np.broadcast_to(family, (len(by_family[0]), *family.shape))
-    return np.take_along_axis(np.stack(by_family), chosen[None], axis=0)[0]
+def settled(family: Family, series: Series) -> Series:
+    """What a family judges at each moment, of its quantity after each decision."""
+    match family.settle:
+        case "mean of 1 s":
+            return mean_of_last_second(series)
+        case "largest of 1 s":
+            return largest_of_last_second(series)
+        case _:
+            return series
 
 
-def mean_velocity(position: Series, start: float = 0.0) -> Series:
-    """Displacement over the last second, per second [m/s]; `start` is x before the first position [m]."""
-    steps = round(MEAN_S / DECISION_DT)
-    before = np.concatenate([np.full((steps, *position.shape[1:]), start), position])[: len(position)]
-    return (position - before) / MEAN_S
+def mean_of_last_second(series: Series) -> Series:
+    """Before the first decision a body stands still."""
+    return _seconds(series, 0.0).mean(axis=-1)
 
 
-def mean_of_last_second(velocity: Series) -> Series:
-    """The mean velocity of the last second [m/s]; before the first decision a body stands still."""
-    steps = round(MEAN_S / DECISION_DT)
-    padded = np.concatenate([np.zeros((steps - 1, *velocity.shape[1:])), velocity])
-    return np.lib.stride_tricks.sliding_window_view(padded, steps, axis=0).mean(axis=-1)
+def largest_of_last_second(series: Series) -> Series:
+    """Of those decisions that there were."""
+    return _seconds(series, -np.inf).max(axis=-1)
 
 
-def fastest_rise(vz: Series) -> Series:
-    """The largest vertical speed of the last second [m/s]."""
-    steps = round(JUMP_S / DECISION_DT)
-    padded = np.concatenate([np.full((steps - 1, *vz.shape[1:]), -np.inf), vz])
-    return np.lib.stride_tricks.sliding_window_view(padded, steps, axis=0).max(axis=-1)
+def _missed(task: Task, state: GlobalState, last: int, *, settles: bool) -> Series:
+    """|difference| of each episode at the last decisions; nobody can hold a jump, so it is settled all the same."""
+    family, of_each = np.asarray(task.family), []
+    for each in FAMILIES:
+        series = np.asarray(each.quantity.read(state), float)[..., 0]
+        judged = settled(each, series) if settles or each.settle == "largest of 1 s" else series
+        of_each.append(np.abs(each.quantity.difference(judged[-last:], np.asarray(task.target, float))))
+    chosen = np.broadcast_to(family, (len(of_each[0]), *family.shape))
+    return np.take_along_axis(np.stack(of_each), chosen[None], axis=0)[0]
+
+
+def _seconds(series: Series, before: float) -> Float[np.ndarray, "time *episode decision"]:
+    """The second that ends with each decision; `before` stands for what was before the first."""
+    padded = np.concatenate([np.full((SECOND - 1, *series.shape[1:]), before), series])
+    return np.lib.stride_tricks.sliding_window_view(padded, SECOND, axis=0)

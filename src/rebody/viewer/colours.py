@@ -3,8 +3,6 @@
 from rebody.report.style import BELIEF, MOTION, TRUTH
 
 HIDDEN, BELIEVED, ROBOT, SUBGOAL = TRUTH, BELIEF, MOTION, "#e07a1f"
-FAMILIES = {"goal": "#6a4c93", "velocity": "#3f8f63", "stand": "#b08900", "jump": "#b5527a"}
-"""By name; other than those of what is hidden, believed and reached."""
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -12,7 +12,7 @@ from rebody.agents.build import AGENTS
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import Trial
 from rebody.inputs import number
-from rebody.tasks import FAMILIES, family_index, family_names
+from rebody.tasks import FAMILIES, family_named, family_names
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.session import target_range
@@ -95,7 +95,7 @@ class Controls:
             self._family = gui.add_dropdown(
                 "Kind",
                 family_names(),
-                hint="goal: reach a place; velocity: run; stand: hold a pitch; jump: leave the floor",
+                hint="; ".join(f"{family.name}: {family.asks}" for family in FAMILIES),
             )
             self._target = gui.add_slider("Target", 0.0, 1.0, 0.1, 0.0)
             self._give = gui.add_button("Change the task now", icon=viser.Icon.TARGET)
@@ -185,7 +185,7 @@ class Controls:
     def _show_range(self, family: str, target: float | None = None) -> None:
         _check_among(self._ranges, family, "kind of task")
         low, high = self._ranges[family]
-        self._target.label = f"Target [{FAMILIES[family_index(family)].unit}]"
+        self._target.label = f"Target [{family_named(family).unit}]"
         self._target.min, self._target.max = low, high
         self._target.value = round(high / 2, 1) if target is None else target
 

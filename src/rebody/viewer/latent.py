@@ -14,6 +14,7 @@ from matplotlib.text import Text
 
 from rebody.agents.belief import Reading
 from rebody.inference.mixture.padded import MixturePrior
+from rebody.tasks import family_named
 from rebody.viewer import colours
 
 STDS = 2.0
@@ -97,7 +98,7 @@ class LatentPicture:
         for k, share in readings[-1].responsibilities.items():
             self._draw_cluster(k, share)
         freshness = np.linspace(1.0, 0.1, len(readings))[::-1]  # the newest is in full colour
-        families = [colours.FAMILIES[reading.family] for reading in readings]
+        families = [family_named(reading.family).colour for reading in readings]
         self._trail.set(offsets=points, sizes=4 + 20 * freshness**4, facecolors=[*map(to_rgba, families, freshness)])
         self._axes.draw_artist(self._trail)
         self._belief.set(**_outline(points[-1], self._plane.covariance(np.diag(readings[-1].latent.variance))))

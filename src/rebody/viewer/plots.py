@@ -7,7 +7,7 @@ import viser
 from jaxtyping import Float
 from viser import uplot
 
-from rebody.tasks import FAMILIES, GOAL, family_index
+from rebody.tasks import FAMILIES, family_named
 from rebody.types import DECISION_DT
 from rebody.viewer import colours
 from rebody.viewer.session import REMEMBERED_S, Moment
@@ -15,14 +15,6 @@ from rebody.viewer.session import REMEMBERED_S, Moment
 Series = tuple[Float[np.ndarray, " time"], ...]
 FONT = "11px system-ui, sans-serif"
 REACHED_PX, PROBABILITY_PX, PADDING = 135, 88, (6, 12, 0, 0)
-GOAL_NAME = FAMILIES[GOAL].name
-QUANTITIES = {
-    "goal": "position x [m]",
-    "velocity": "velocity [m/s]",
-    "stand": "pitch [rad]",
-    "jump": "vertical speed [m/s]",
-}
-"""By family: what it is about."""
 BEHIND = (3, 3)
 """Dashes of a line that is about negative targets [pixels]."""
 LOOSE: uplot.Series = {"auto": False}
@@ -47,7 +39,7 @@ def limits(values: Sequence[Float[np.ndarray, " time"]], family: str) -> tuple[f
     """Ends of an axis, around 0 and all values."""
     shown = np.append(np.concatenate(values), 0.0)
     low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
-    margin = 0.1 * max(high - low, FAMILIES[family_index(family)].floor)
+    margin = 0.1 * max(high - low, family_named(family).floor)
     return low - margin, high + margin
 
 
@@ -68,7 +60,7 @@ class ReachedPlot:
     """What the robot reaches, what is hidden, what is believed."""
 
     def __init__(self, gui: viser.GuiApi):
-        self._family = GOAL_NAME
+        self._family = FAMILIES[0].name
         hidden, robot, believed = colours.HIDDEN, colours.ROBOT, colours.BELIEVED
         self._plot = gui.add_uplot(
             data=_with_limits(reached_series([], self._family), self._family),
@@ -81,7 +73,7 @@ class ReachedPlot:
                 {"width": 0, "points": {"show": False}},
             ),
             scales={"x": {"time": False}},
-            axes=_axes(QUANTITIES[self._family]),
+            axes=_axes(_label(self._family)),
             legend={"show": False},
             height=REACHED_PX,
             padding=PADDING,
@@ -90,7 +82,7 @@ class ReachedPlot:
     def show(self, moments: Sequence[Moment], family: str) -> None:
         """The last seconds, in the unit of that family."""
         if family != self._family:
-            self._family, self._plot.axes = family, _axes(QUANTITIES[family])
+            self._family, self._plot.axes = family, _axes(_label(family))
         self._plot.data = _with_limits(reached_series(moments, family), family)
 
 
@@ -102,7 +94,7 @@ class ProbabilityPlot:
         lines: list[uplot.Series] = [
             {
                 "label": f"{family} {'+' if sign > 0 else '-'}",
-                "stroke": colours.FAMILIES[family],
+                "stroke": family_named(family).colour,
                 "width": 2,
                 "dash": () if sign > 0 else BEHIND,
                 "points": {"show": False},
@@ -126,6 +118,12 @@ class ProbabilityPlot:
     def remove(self) -> None:
         """Another module may know other families."""
         self._plot.remove()
+
+
+def _label(family: str) -> str:
+    """What a family is about."""
+    quantity = family_named(family).quantity
+    return f"{quantity.label} [{quantity.unit}]"
 
 
 def _dots(colour: str) -> uplot.Series_Points:

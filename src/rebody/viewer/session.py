@@ -131,4 +131,4 @@ def _fields(state: GlobalState, trial: Trial) -> dict[str, float]:
 
 
 def _reached(state: GlobalState) -> dict[str, float]:
-    return {family.name: float(getattr(state, family.field)[0]) for family in FAMILIES}
+    return {family.name: float(family.quantity.read(state)[0, 0]) for family in FAMILIES}

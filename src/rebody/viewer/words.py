@@ -10,7 +10,7 @@ from jaxtyping import UInt8
 from PIL import Image
 
 from rebody.agents.build import AGENTS
-from rebody.tasks import FAMILIES, family_index
+from rebody.tasks import FAMILIES, family_named
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import colours
 from rebody.viewer.session import Moment, Session
@@ -23,8 +23,7 @@ GUIDE = f"""
 **In the middle.** The robot; the view follows it along *x*, drag to turn, scroll to zoom. Poles mark goals [m], arrows
 speeds [m/s], or point to a goal that is farther away than the picture shows.
 
-**Black, dashed: the hidden task.** Reach a position (*goal*), run at a speed (*velocity*), hold a pitch (*stand*), or
-leave the floor at a speed (*jump*).
+**Black, dashed: the hidden task.** {"; ".join(f"*{family.name}*: {family.asks}" for family in FAMILIES)}.
 
 **Red: the belief**, as a linear probe reads it from the module's latent, and how sure it is of the kind. It begins with
 a guess.
@@ -73,7 +72,7 @@ def _line(html_text: str) -> str:
 
 def family_legend(families: Sequence[str]) -> str:
     """Which line is which, as HTML."""
-    names = " &nbsp; ".join(dot(colours.FAMILIES[family]) + family for family in families)
+    names = " &nbsp; ".join(dot(family_named(family).colour) + family for family in families)
     return _line(f"Kind of task: {names} &nbsp; (dashed: negative)")
 
 
@@ -110,4 +109,4 @@ def named(family: str, target: float) -> str:
 
 def value(family: str, number: float) -> str:
     """A number with its unit."""
-    return f"{number:+.2f} {FAMILIES[family_index(family)].unit}"
+    return f"{number:+.2f} {family_named(family).unit}"

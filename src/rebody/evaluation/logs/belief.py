@@ -14,7 +14,7 @@ from rebody.agents.parts import Inference
 from rebody.evaluation.logs.file import COLUMNS, REWARD, TIME
 from rebody.evaluation.logs.resample import Decisions
 from rebody.store.files import written_whole
-from rebody.tasks import FAMILIES, family_index
+from rebody.tasks import family_named
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class BeliefOverTime:
         if not self.believed:
             return "believes nothing: there was no reward that it could believe"
         last = self.readings[-1]
-        family = FAMILIES[family_index(last.family)]
+        family = family_named(last.family)
         is_same = self.believes(last.family)
         is_close = is_same & (np.abs(self.targets - last.target) <= family.tolerance)
         return (

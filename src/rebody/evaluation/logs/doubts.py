@@ -53,7 +53,7 @@ def _values_out_of_range(decisions: Decisions, contract: Contract) -> list[str]:
 def _limits(contract: Contract) -> dict[str, float]:
     """The farthest that tasks of the training led each field, either way [m, m/s, rad]."""
     asked = {
-        family.field: max(abs(end) for end in contract.target_ranges[family.name])
+        family.quantity.name: max(abs(end) for end in contract.target_ranges[family.name])
         for family in FAMILIES
         if family.name in contract.target_ranges
     }

@@ -28,5 +28,5 @@ def begun_at_zero(log: Log, contract: Contract) -> Log:
 
 def _farthest(field: str, contract: Contract) -> float:
     """Goal of the training [m]."""
-    learned = [contract.target_ranges.get(family.name, ()) for family in FAMILIES if family.field == field]
+    learned = [contract.target_ranges.get(family.name, ()) for family in FAMILIES if family.quantity.name == field]
     return max((abs(end) for ends in learned for end in ends), default=FARTHEST_M)

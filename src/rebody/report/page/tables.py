@@ -7,7 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rebody.evaluation.results import EpisodeResult, Results
-from rebody.tasks import FAMILIES, family_index
+from rebody.tasks import family_named
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def _row(episode: EpisodeResult) -> list[str]:
         _task(episode),
         str(episode.seed),
         f"{episode.inferred_family[-1]} {episode.inferred_target[-1]:+.3f}",
-        f"{episode.final_error:.3f} {FAMILIES[family_index(episode.active_family[-1])].unit}",
+        f"{episode.final_error:.3f} {family_named(episode.active_family[-1]).unit}",
         f"{episode.ripple_m_s:.3f}",
         f"{episode.return_:.2f}",
         "-" if episode.oracle_return is None else f"{episode.oracle_return:.2f}",
