@@ -88,13 +88,13 @@ def test_every_agent_does_the_same_tasks(trial, tmp_path):
     told = []
     diagnosis = diagnose(trial, [TaskSpec("goal", 3.0), TaskSpec("goal", -2.0)], 1, told.append)
     assert told == list(LADDER)
-    assert [results.agent for results in diagnosis.results.values()] == told
+    assert [results.agent for results in diagnosis.results.values()] == [*told, "idle"]
     assert len({tuple(e.target for e in results.episodes) for results in diagnosis.results.values()}) == 1
     console = Console(width=200, record=True, file=io.StringIO())
     for table in diagnosis_tables(diagnosis):
         console.print(table)
     text = console.export_text()
-    assert all(what in text for what in LADDER.values())
+    assert all(what in text for what in (*LADDER.values(), "idle: stands still"))
     assert f"{diagnosis.results['bayes'].summary['families']['goal']['median_error']['value']:.3f}" in text
     plot_diagnosis(diagnosis, tmp_path / "d.png")
     assert (tmp_path / "d.png").stat().st_size > 10_000

@@ -22,6 +22,8 @@ LADDER = {
     "reuse": "+ the high level and the bridge",
 }
 """Agents that differ by one part each, in the order in which parts are added."""
+IDLE = "idle"
+"""Stands beside the ladder: what nobody's part could lose."""
 PARTS = ("wrong base task", "wrong slot", "target read", "high level", "tracker")
 SLOT_FROM = 20
 """Decisions after which base task and slot count as right or wrong."""
@@ -99,6 +101,7 @@ def diagnose(trial: Trial, specs: list[TaskSpec], seeds: int, tell: Callable[[st
         tell(agent)
         yardsticks = yardsticks or take_yardsticks(trial, specs, seeds)
         results[agent] = evaluate(replace(trial, agent=agent), specs, seeds, yardsticks)
+    results[IDLE] = evaluate(replace(trial, agent=IDLE), specs, seeds, yardsticks)
     return Diagnosis(results)
 
 
@@ -148,10 +151,13 @@ def _ladder(diagnosis: Diagnosis) -> Table:
     table.add_column("fell \\[%]", justify="right")
     table.add_column("return that it costs", justify="right")
     lost = diagnosis.lost()
-    for agent, what in LADDER.items():
+    for agent, what in (LADDER | {IDLE: "idle: stands still"}).items():
+        if agent not in diagnosis.results:
+            continue
         summary = diagnosis.results[agent].summary
         errors = [f"{summary['families'][family.name]['median_error']['value']:.3f}" for family in families]
-        table.add_row(what, *errors, f"{100 * summary['fell']['value']:.1f}", f"{lost[agent]:.2f}")
+        cost = f"{lost[agent]:.2f}" if agent in lost else "-"
+        table.add_row(what, *errors, f"{100 * summary['fell']['value']:.1f}", cost)
     return table
 
 

@@ -6,14 +6,14 @@ from rebody.evaluation.diagnosis import LADDER, Diagnosis
 from rebody.report.figures import draw_errors
 from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, as_text, figure
 
-COLOURS = dict(zip(LADDER, (ORACLE, IDLE, BELIEF, MOTION), strict=True))
+COLOURS = dict(zip((*LADDER, "idle"), (ORACLE, IDLE, BELIEF, MOTION, "#9a9a9a"), strict=True))
 
 
 def plot_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
     """Left: the return that each part costs. Then, per family, the errors as parts are added, sorted."""
     families = diagnosis.families
     with figure(path, 1, 1 + len(families), size=(4.5 * (1 + len(families)), 4.2)) as (drawing, (costs, *errors)):
-        costs.barh(list(LADDER.values()), [-cost for cost in diagnosis.lost().values()], color=list(COLOURS.values()))
+        costs.barh(list(LADDER.values()), [-cost for cost in diagnosis.lost().values()], color=[COLOURS[agent] for agent in LADDER])
         costs.invert_yaxis()
         costs.set(xlabel="return that it costs", title="what each part costs")
         for axes, family in zip(errors, families, strict=True):
