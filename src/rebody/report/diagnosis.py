@@ -13,7 +13,8 @@ def plot_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
     """Left: the return that each part costs. Then, per family, the errors as parts are added, sorted."""
     families = diagnosis.families
     with figure(path, 1, 1 + len(families), size=(4.5 * (1 + len(families)), 4.2)) as (drawing, (costs, *errors)):
-        costs.barh(list(LADDER.values()), [-cost for cost in diagnosis.lost().values()], color=[COLOURS[agent] for agent in LADDER])
+        lost = [-cost for cost in diagnosis.lost().values()]
+        costs.barh(list(LADDER.values()), lost, color=[COLOURS[agent] for agent in LADDER])
         costs.invert_yaxis()
         costs.set(xlabel="return that it costs", title="what each part costs")
         for axes, family in zip(errors, families, strict=True):
