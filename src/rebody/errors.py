@@ -1,8 +1,17 @@
 """The one exception that users are meant to see."""
 
+import difflib
+from collections.abc import Iterable
+
 
 class RebodyError(Exception):
     """Something the user can mend: the message says what was wrong and what to do.
 
     The command line prints the message alone and exits with code 2.
     """
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """A question about a known name that is near, else nothing; goes behind a message's first sentence."""
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f" Did you mean '{near[0]}'?" if near else ""

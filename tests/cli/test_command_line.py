@@ -69,9 +69,9 @@ def test_run_draws_an_episode(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["run", "--task", "goal=1", "--robot", "cheeta"], "did you mean 'cheetah'"),
+        (["run", "--task", "goal=1", "--robot", "cheeta"], "Did you mean 'cheetah'"),
         (["run", "--task", "goal=far"], "write FAMILY=TARGET"),
-        (["run", "--task", "gaol=1"], "did you mean 'goal'"),
+        (["run", "--task", "gaol=1"], "Did you mean 'goal'"),
         (["run", "--task", "goal=1", "--inference", "positoin"], "position"),
         (["run", "--task", "goal=1", "--inference", "tracker-cheetah"], "tracker"),
         (
@@ -85,7 +85,7 @@ def test_run_draws_an_episode(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (["run", "--task", "goal=1", "--agent", "oracle", "--thesis"], "thesis mode is for the agents reuse, retrain"),
         (["run", "--task", "goal=1", "--agent", "flat", "--flat", "tracker-cheetah"], "'flat' is needed"),
         (["train", "flat", "--robot", "cheetah", "--inference", "positoin", "--out", "x"], "mean 'position'?"),
-        (["figure", "6.33"], "there is no figure '6.33'. Did you mean 6.3? Figures are: 6.1, 6.2, 6.3"),
+        (["figure", "6.33"], "there is no figure '6.33'. Did you mean '6.3'? Figures are: 6.1, 6.2, 6.3"),
         (["figure", "6.3", "7"], "there is no figure '7'. Figures are:"),
         (["evaluate", "--tasks", "nowhere.json"], "no task file"),
         (["report"], "there is nothing to report. Give the folder of a training run or of an artifact"),
@@ -93,7 +93,7 @@ def test_run_draws_an_episode(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (["report", "."], "holds nothing to report"),
         (["report", "position", "--out", "page.json"], "must end with .html"),
         (["train", "inference", "--preset", "positions", "--out", "x"], "Presets are: position"),
-        (["train", "tracker", "--robot", "hoper", "--out", "x"], "did you mean 'hopper'"),
+        (["train", "tracker", "--robot", "hoper", "--out", "x"], "Did you mean 'hopper'"),
         (["robot", "check", "hoper"], "Robots are: cheetah, hopper, walker, or the path of a robot's TOML file"),
         (["robot", "check", "none.toml"], "cannot read the robot's file 'none.toml'"),
         (["stress", "--robot", "./none.toml"], "cannot read the robot's file 'none.toml'"),

@@ -104,7 +104,7 @@ def test_tasks_are_drawn_from_the_base_tasks():
         ({"family": "goal"}, "'family' and 'target' together"),
         ({"target": 1.0}, "'family' and 'target' together"),
         ({"family": "goal", "target": 1.0, "speed": 1}, "'speed'; give 'family' and 'target'"),
-        ({"family": "gaol", "target": 1.0}, r"did you mean 'goal'\?"),
+        ({"family": "gaol", "target": 1.0}, r"Did you mean 'goal'\?"),
         ({"family": 3, "target": 1.0}, "unknown task family '3'"),
         ({"family": "goal", "target": "far"}, "the target is 'far'; give a number"),
         ({"family": "goal", "target": float("nan")}, "the target is nan; give a finite number"),

@@ -50,7 +50,7 @@ def _spoil(path, spoil):
         (lambda c: c["episodes"][1]["quantities"].pop("x"), "with the family 'goal' lacks its quantity"),
         (lambda c: c["episodes"][1]["quantities"]["x"].pop(), "episode of 30 decisions has a 'x' of 29"),
         (lambda c: c["episodes"][1].update(active_target=[[1.0, 2.0]] * 30), "active_target"),
-        (lambda c: c["episodes"][1].update(active_family=["gaol"] * 30), "did you mean 'goal'"),
+        (lambda c: c["episodes"][1].update(active_family=["gaol"] * 30), "Did you mean 'goal'"),
     ],
 )
 def test_what_was_edited_is_refused(spoil, says, path):

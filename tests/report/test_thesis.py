@@ -123,7 +123,7 @@ def test_figures_are_found_by_number():
     assert [figure.number for figure in find_figures(["6.9", "6.1", "6.9"])] == ["6.9", "6.1"]
     assert find_figures(["all"]) == list(FIGURES.values())
     with pytest.raises(
-        RebodyError, match=r"no figure '6\.99'\. Did you mean 6\.9\? Figures are: 6\.1, 6\.2, .*, or all"
+        RebodyError, match=r"no figure '6\.99'\. Did you mean '6\.9'\? Figures are: 6\.1, 6\.2, .*, or all"
     ):
         find_figures(["6.1", "6.99"])
 

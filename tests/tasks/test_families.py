@@ -56,5 +56,5 @@ def test_front_and_back_of_each_family_are_base_tasks():
 
 def test_family_index():
     assert [family_index(name) for name in ("goal", "velocity", "stand")] == [GOAL, VELOCITY, STAND]
-    with pytest.raises(RebodyError, match=r"unknown task family 'velocty'; did you mean 'velocity'\?.*goal"):
+    with pytest.raises(RebodyError, match=r"unknown task family 'velocty'\. Did you mean 'velocity'\?.*goal"):
         family_index("velocty")

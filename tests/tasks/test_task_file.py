@@ -48,7 +48,7 @@ MALFORMED = [
     (without(GOOD, "family"), "'family' is missing"),
     (without(GOOD, "target"), "'target' is missing"),
     (GOOD | {"targt": 1}, "unknown key 'targt'; known are family, switch, target"),
-    (GOOD | {"family": "gaol"}, "unknown task family 'gaol'; did you mean 'goal'"),
+    (GOOD | {"family": "gaol"}, "unknown task family 'gaol'. Did you mean 'goal'"),
     (GOOD | {"family": 2}, "the family must be a name, got 2"),
     (GOOD | {"target": "far"}, "the target is 'far'; give a number"),
     (GOOD | {"target": True}, "the target is True; give a number"),
@@ -112,7 +112,7 @@ def test_parse_task():
         ("goal=far", "write FAMILY=TARGET"),
         ("goal=nan", "the target is nan; give a finite number"),
         ("goal=1_0", "write FAMILY=TARGET"),
-        ("gaol=3", "did you mean 'goal'"),
+        ("gaol=3", "Did you mean 'goal'"),
         ("=3", "unknown task family"),
     ],
 )

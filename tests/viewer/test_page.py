@@ -193,7 +193,7 @@ def test_a_missing_extra_is_said(monkeypatch, capsys, package):
     ("arguments", "says"),
     [
         (["--task", "velocity=1", "--inference", "position"], "cannot infer 'velocity'"),
-        (["--robot", "cheeta"], "did you mean 'cheetah'"),
+        (["--robot", "cheeta"], "Did you mean 'cheetah'"),
         (["--agent", "magic"], "Agents are: reuse"),
         (["--robot", "point-mass", "--agent", "flat"], "learned on a robot, and a point mass is none"),
     ],

@@ -1,6 +1,5 @@
 """Robots from TOML files: one format for the shipped ones and for a user's own."""
 
-import difflib
 import math
 import tomllib
 from pathlib import Path
@@ -9,7 +8,7 @@ import gymnasium
 import msgspec
 
 from rebody.bodies.robot import Fall, Reach, RobotSpec
-from rebody.errors import RebodyError
+from rebody.errors import RebodyError, did_you_mean
 from rebody.names import ROBOTS, shipped_robots
 from rebody.store.files import TEXT, read_file
 
@@ -56,10 +55,9 @@ def load_robot(robot: str) -> RobotSpec:
         return _read(ROBOTS / f"{robot}.toml")
     if robot.endswith(".toml") or "/" in robot:
         return _read(Path(robot))
-    near = difflib.get_close_matches(robot, shipped_robots(), n=1)
-    hint = f"; did you mean '{near[0]}'?" if near else "."
     raise RebodyError(
-        f"unknown robot '{robot}'{hint} Robots are: {', '.join(shipped_robots())}, or the path of a robot's TOML file."
+        f"unknown robot '{robot}'.{did_you_mean(robot, shipped_robots())} Robots are: {', '.join(shipped_robots())}, "
+        "or the path of a robot's TOML file."
     )
 
 

@@ -1,6 +1,5 @@
 """Artifacts: folders that hold a trained part with all that is needed to rebuild, check and explain it."""
 
-import difflib
 import hashlib
 import json
 import os
@@ -13,7 +12,7 @@ import numpy as np
 import safetensors.numpy
 from safetensors import SafetensorError
 
-from rebody.errors import RebodyError
+from rebody.errors import RebodyError, did_you_mean
 from rebody.store.checkpoint import holds_checkpoint
 from rebody.store.files import DATA, TEXT, output_file, read_file, reason
 from rebody.store.files import WEIGHTS as LARGEST_WEIGHTS
@@ -160,8 +159,7 @@ def _find(reference: str | Path, kind: str | None) -> Path:
 
 
 def _unknown(reference: str, kind: str | None) -> str:
-    close = difflib.get_close_matches(reference, _names_of(kind), n=1)
-    guess = f" Did you mean {close[0]!r}?" if close else ""
+    guess = did_you_mean(reference, _names_of(kind))
     return f"no artifact or folder called {reference!r}.{guess} {_shipped_of(kind)}"
 
 

@@ -1,6 +1,5 @@
 """The families of tasks and the reward that is all an agent ever hears of them."""
 
-import difflib
 from dataclasses import dataclass
 from typing import Literal
 
@@ -8,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float, Int
 
-from rebody.errors import RebodyError
+from rebody.errors import RebodyError, did_you_mean
 from rebody.tasks.quantities import PITCH, VX, VZ, Quantity, X, wrapped
 from rebody.types import AnyArray, GlobalState, Task
 
@@ -61,9 +60,7 @@ def family_index(name: str) -> int:
     names = family_names()
     if name in names:
         return names.index(name)
-    near = difflib.get_close_matches(name, names, n=1)
-    hint = f"; did you mean '{near[0]}'?" if near else ""
-    raise RebodyError(f"unknown task family '{name}'{hint} Families are: {', '.join(names)}.")
+    raise RebodyError(f"unknown task family '{name}'.{did_you_mean(name, names)} Families are: {', '.join(names)}.")
 
 
 def family_named(name: str) -> Family:

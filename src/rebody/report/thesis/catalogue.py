@@ -1,13 +1,12 @@
 """Every figure by its number: where its log comes from, how it is drawn, and what is seen."""
 
-import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from rebody import names
-from rebody.errors import RebodyError
+from rebody.errors import RebodyError, did_you_mean
 from rebody.report.thesis import balancing, retrained, zero_shot
 from rebody.report.thesis import first_experiment as first
 from rebody.report.thesis import several_families as several
@@ -224,9 +223,8 @@ def find_figures(numbers: Sequence[str]) -> list[ThesisFigure]:
         return list(FIGURES.values())
     for number in numbers:
         if number not in FIGURES:
-            near = difflib.get_close_matches(number, FIGURES, n=1)
-            hint = f" Did you mean {near[0]}?" if near else ""
-            raise RebodyError(f"there is no figure '{number}'.{hint} Figures are: {', '.join(FIGURES)}, or all.")
+            guess = did_you_mean(number, FIGURES)
+            raise RebodyError(f"there is no figure '{number}'.{guess} Figures are: {', '.join(FIGURES)}, or all.")
     return [FIGURES[number] for number in dict.fromkeys(numbers)]
 
 

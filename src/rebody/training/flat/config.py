@@ -19,6 +19,8 @@ class FlatConfig:
     """Updates in an iteration."""
     iterations: Number = 700
     """Length of the run."""
+    evaluate_every: Count = 50
+    """Iterations from one measurement on held-out tasks to the next."""
     replay: Rows = 500_000
     """Transitions kept."""
     decisions: Decisions = 200

@@ -30,8 +30,6 @@ from rebody.training.run import Metrics, Run
 from rebody.training.transitions import learn, no_transitions
 from rebody.types import AnyArray, Belief
 
-EVALUATE_EVERY = 50
-
 
 class RunState(eqx.Module):
     """Everything that a resumed run needs; host arrays are written in place."""
@@ -92,7 +90,7 @@ def iterate(
         (policy, minds, batch.state, state.iteration + 1),
     )
     metrics |= {"task_reward": earned}
-    if (iteration + 1) % EVALUATE_EVERY == 0:
+    if (iteration + 1) % config.evaluate_every == 0:
         figures = measure(flat_policy(state, module), module, batch.spec)
         metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
     return state, {name: float(value) for name, value in metrics.items()}

@@ -19,6 +19,8 @@ class HighLevelConfig:
     """Updates in an iteration."""
     iterations: Number = 320
     """Length of the run."""
+    evaluate_every: Count = 20
+    """Iterations from one measurement on held-out tasks to the next."""
     replay: Rows = 512_000
     """Decisions kept: all of the run. Without its first ones, which tried everything, it gets worse again."""
     decisions: Decisions = 100

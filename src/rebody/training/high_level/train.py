@@ -32,8 +32,6 @@ from rebody.training.run import Metrics, Run
 from rebody.training.transitions import learn, no_transitions
 from rebody.types import AnyArray, GlobalState, Subgoal
 
-EVALUATE_EVERY = 20
-
 
 @dataclass(frozen=True)
 class Frozen:
@@ -105,7 +103,7 @@ def iterate(
         (policy, minds, batch.state, state.iteration + 1),
     )
     metrics |= learned
-    if (iteration + 1) % EVALUATE_EVERY == 0:
+    if (iteration + 1) % config.evaluate_every == 0:
         figures = measure(slot_policy(state, frozen), frozen.module, frozen.controller, batch.spec)
         metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
     return state, {name: float(value) for name, value in metrics.items()}

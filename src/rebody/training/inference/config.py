@@ -87,6 +87,8 @@ class MetaConfig:
     """Iterations after that in which inference, the policy, and one that is told the task learn together."""
     policy_iterations: Number = 90
     """Iterations after that in which inference is frozen and the policy learns on."""
+    evaluate_every: Count = 10
+    """Iterations from one measurement on held-out tasks to the next."""
     inference_updates: Number = 128
     """Updates of encoder and decoder in an iteration."""
     policy_updates: Number = 512

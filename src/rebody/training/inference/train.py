@@ -36,7 +36,6 @@ from rebody.training.inference.report import save_inference
 from rebody.training.run import Metrics, Run
 from rebody.types import AnyArray, Transition, Tree
 
-EVALUATE_EVERY = 10
 HELD_OUT = 200
 """Held-out tasks of an evaluation."""
 BEGINS_AT_START = 0.3
@@ -113,7 +112,7 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
         policy, policy_metrics = update_policy(policy, interpreted, stored, config, config.policy_view, keys[2])
         metrics |= policy_metrics
     state = RunState(module, optimiser, policy, told, clusters, replay, state.iteration + 1)
-    if (iteration + 1) % EVALUATE_EVERY == 0:
+    if (iteration + 1) % config.evaluate_every == 0:
         figures = measure(trained_parts(state, config), toy, config, HELD_OUT)
         metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
     return state, {name: float(value) for name, value in metrics.items()}

@@ -8,7 +8,7 @@ from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
-from rebody.ranges import Copies, Decisions, NotNegative, Number, Share
+from rebody.ranges import Copies, Count, Decisions, NotNegative, Number, Share
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.presets import goal_velocity
 from rebody.training.minds import within_reach
@@ -26,6 +26,8 @@ class ScratchConfig:
     """Iterations whose episodes are kept for learning."""
     iterations: Number = 512
     """Length of the run; an iteration is an episode of every robot."""
+    evaluate_every: Count = 32
+    """Iterations from one measurement on held-out tasks to the next."""
     inference_updates: Number = 64
     """Updates of encoder and decoder in an iteration."""
     policy_updates: Number = 384

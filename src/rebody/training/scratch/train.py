@@ -36,7 +36,6 @@ from rebody.training.scratch.config import ScratchConfig
 from rebody.training.scratch.report import measure, save_scratch
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
-EVALUATE_EVERY = 32
 REFRESH_EVERY = 8
 """Iterations after which today's encoder goes along all stored episodes again."""
 DECIDES_EVERY = 4
@@ -115,7 +114,7 @@ def iterate(
     policy, learned = update_policy(state.sac, module, replay, stored, config, keys[2])
     state = RunState(module, optimiser, policy, replay, state.iteration + 1)
     metrics |= learned | {"task_reward": fresh.episodes.reward.mean()}
-    if (iteration + 1) % EVALUATE_EVERY == 0:
+    if (iteration + 1) % config.evaluate_every == 0:
         figures = measure(trained_parts(state, meta), meta, batch.spec)
         metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
     return state, {name: float(value) for name, value in metrics.items()}

@@ -19,6 +19,8 @@ class StepPredictorConfig:
     """Updates in an iteration."""
     iterations: Number = 60
     """Length of the run."""
+    evaluate_every: Count = 50
+    """Iterations from one measurement on held-out commands to the next."""
     replay: Rows = 200_000
     """Transitions kept; one is a subgoal, however long it was held."""
     change_probability: Share = 0.05

@@ -30,8 +30,6 @@ from rebody.training.step_predictor.config import StepPredictorConfig
 from rebody.training.step_predictor.report import measure, save_step_predictor
 from rebody.training.transitions import learn, no_transitions
 
-EVALUATE_EVERY = 50
-
 
 class RunState(eqx.Module):
     """Everything that a resumed run needs; host arrays are written in place."""
@@ -97,7 +95,7 @@ def iterate(
         state,
         (policy, batch.state, state.iteration + 1),
     )
-    if (iteration + 1) % EVALUATE_EVERY == 0:
+    if (iteration + 1) % config.evaluate_every == 0:
         figures = measure(Deciding(state.sac.averaged_actor), tracker, batch.spec, config)
         metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
     return state, {name: float(value) for name, value in metrics.items()}

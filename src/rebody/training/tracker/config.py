@@ -23,6 +23,8 @@ class TrackerConfig:
     """Updates in an iteration."""
     iterations: Number = 700
     """Length of the run."""
+    evaluate_every: Count = 100
+    """Iterations from one measurement on held-out commands to the next."""
     replay: Rows = 500_000
     """Transitions kept."""
     relabelled: Share = 0.5

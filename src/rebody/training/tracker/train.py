@@ -31,8 +31,6 @@ from rebody.training.tracker.report import measure, save_tracker
 from rebody.training.tracker.schedule import schedule, speed_share
 from rebody.types import AnyArray
 
-EVALUATE_EVERY = 100
-
 
 class Replay(eqx.Module):
     """Transitions of control steps: a ring in host memory, written in place, or batches drawn from it."""
@@ -103,7 +101,7 @@ def iterate(state: RunState, batch: RobotBatch, config: TrackerConfig, seed: int
         state,
         (policy, batch.state, state.iteration + 1),
     )
-    if (iteration + 1) % EVALUATE_EVERY == 0:
+    if (iteration + 1) % config.evaluate_every == 0:
         figures = measure(_tracker(state, config), batch.spec)
         metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
     return state, {name: float(value) for name, value in metrics.items()}
