@@ -33,6 +33,15 @@ class TrackerEnv(gymnasium.Env):
         self._batch = RobotBatch(self._spec, 1, threads=1)
         self.action_space = spaces.Box(-1.0, 1.0, (self._spec.model.nu,), np.float32)
 
+    def __getstate__(self) -> dict[str, Any]:
+        # MuJoCo's batch cannot be copied; the numbers that it continues from can
+        return self.__dict__ | {"_batch": self._batch.state}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._batch = RobotBatch(self._spec, 1, threads=1)
+        self._batch.state = state["_batch"]
+
     @cached_property
     @own_jax_settings()
     def observation_space(self) -> spaces.Box:
