@@ -108,10 +108,14 @@ def task_of_options(options: Any) -> Task | None:
 
     RebodyError where it is not a family and a target.
     """
-    if options is None or options == {}:
+    if options is None:
         return None
     if not isinstance(options, Mapping):
-        raise RebodyError(f'reset options are {options!r}; give a mapping such as {{"family": "goal", "target": -3.0}}.')
+        raise RebodyError(
+            f'reset options are {options!r}; give a mapping such as {{"family": "goal", "target": -3.0}}.'
+        )
+    if not options:
+        return None
     if options.keys() != {"family", "target"}:
         raise RebodyError(
             f"reset options are {', '.join(map(repr, options))}; give 'family' and 'target' together, "
