@@ -113,10 +113,10 @@ class Robots(Bodies):
 
     def __getstate__(self) -> dict[str, Any]:
         # MuJoCo's batch cannot be copied; the numbers that it continues from can
-        return self.__dict__ | {"_batch": self._batch.state}
+        return vars(self) | {"_batch": self._batch.state}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        vars(self).update(state)
         self._batch = RobotBatch(self._spec, self.size, self._threads)
         self._batch.state = state["_batch"]
 

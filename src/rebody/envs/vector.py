@@ -100,7 +100,8 @@ class TaskVectorEnv(VectorEnv):
         """Gymnasium's convention: beside every entry, a mask of the bodies that have it; elsewhere 0 or None."""
         info: dict[str, Any] = {}
         for name, values in self._world.info().items():
-            info[name] = np.where(told, values, None if values.dtype == object else 0)
+            nothing: Any = None if values.dtype == object else 0
+            info[name] = np.where(told, values, nothing)
             info[f"_{name}"] = told.copy()
         return info
 

@@ -7,7 +7,7 @@ from typing import Any, cast, get_args
 import jax
 import numpy as np
 from gymnasium import spaces
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from rebody import inputs
 from rebody.bodies.camera import Camera
@@ -15,7 +15,7 @@ from rebody.envs.bodies import Bodies
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
 from rebody.tasks import BaseTask, RewardForm, TaskDistribution, family_index, family_names, reward
-from rebody.types import GLOBAL_FIELDS, GlobalState, Task
+from rebody.types import GLOBAL_FIELDS, AnyArray, GlobalState, Task
 
 DEFAULT_BASE_TASKS = (
     BaseTask("goal", 0.5, 10.0),
@@ -43,7 +43,7 @@ class World:
 
     def __getstate__(self) -> dict[str, Any]:
         # a copy opens a camera of its own
-        return self.__dict__ | {"_camera": None}
+        return vars(self) | {"_camera": None}
 
     @property
     def observation_space(self) -> spaces.Box:
@@ -58,7 +58,7 @@ class World:
 
     def reset(self, body: int, rng: np.random.Generator, task: Task | None = None) -> None:
         """Put one body at its start and give it that task, else a drawn one."""
-        task = task or self._tasks.draw(rng)
+        task = self._tasks.draw(rng) if task is None else task
         self._families[body], self._targets[body] = task.family, task.target
         self.bodies.reset(body, rng)
         self._begun[body] = True
@@ -99,7 +99,7 @@ class World:
 
 
 @partial(jax.jit, static_argnames="form")
-def _reward(task: Task, state: GlobalState, form: RewardForm) -> Float[Array, " body"]:
+def _reward(task: Task, state: GlobalState, form: RewardForm) -> Float[AnyArray, " body"]:
     return reward(task, state, form)
 
 

@@ -38,10 +38,10 @@ class TrackerEnv(gymnasium.Env):
 
     def __getstate__(self) -> dict[str, Any]:
         # MuJoCo's batch cannot be copied; the numbers that it continues from can
-        return self.__dict__ | {"_batch": self._batch.state}
+        return vars(self) | {"_batch": self._batch.state}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        vars(self).update(state)
         self._batch = RobotBatch(self._spec, 1, threads=1)
         self._batch.state = state["_batch"]
 
@@ -78,11 +78,10 @@ class TrackerEnv(gymnasium.Env):
         self._batch.step(action[None])
         motion = motion_of(self._batch, before)
         reward = _reward(told, motion, action.astype(np.float32)[None], self._spec.control_dt, config)
-        self._command = jax.tree.map(np.asarray, after(told, motion))
+        command: Command = jax.tree.map(np.asarray, after(told, motion))
         self._steps_left -= 1
-        if self._steps_left < 0:
-            self._command = self._new_command()
-        return self._observe(self._command), float(reward[0]), bool(motion.fell[0]), False, {}
+        self._command = command = self._new_command() if self._steps_left < 0 else command
+        return self._observe(command), float(reward[0]), bool(motion.fell[0]), False, {}
 
     def _new_command(self) -> Command:
         key = jax.random.key(self.np_random.integers(2**32, dtype=np.uint32))
