@@ -78,7 +78,7 @@ class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
             raise RebodyError("nothing is believed before the first reset: call reset.")
         return self._belief
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(self, *, seed: Any = None, options: Any = None):
         """Start anew and forget; RebodyError where `observe` does not give what the module sees."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._belief, self._rewards = None, []

@@ -30,7 +30,7 @@ class TaskEnv(gymnasium.Env):
         self.observation_space = self._world.observation_space
         self.action_space = self._world.action_space
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(self, *, seed: Any = None, options: Any = None):
         """Start anew; `options` may name the task: {"family": "goal", "target": -3.0}.
 
         RebodyError, and nothing is reset, for other options or a seed that is none.

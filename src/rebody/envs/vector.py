@@ -54,9 +54,7 @@ class TaskVectorEnv(VectorEnv):
         """The seed of each body's generator."""
         return tuple(seed for _, seed in self._seeded)
 
-    def reset(
-        self, *, seed: int | Sequence[int | None] | np.ndarray | None = None, options: dict[str, Any] | None = None
-    ):
+    def reset(self, *, seed: Any = None, options: Any = None):
         """Start all anew, or those of `options["reset_mask"]`, a boolean array, and leave the others as they are.
 
         An integer seeds body i with seed + i, a list has a seed of each body. `options` may name the task of all.

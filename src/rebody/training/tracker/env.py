@@ -1,5 +1,6 @@
 """What a tracker learns, as a plain Gymnasium environment: for other learners, and to compare them with ours."""
 
+from collections.abc import Mapping
 from functools import cached_property, partial
 from typing import Any
 
@@ -55,9 +56,9 @@ class TrackerEnv(gymnasium.Env):
         return spaces.Box(-np.inf, np.inf, seen.shape[1:], np.float32)
 
     @own_jax_settings()
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(self, *, seed: Any = None, options: Any = None):
         """The rest pose, and a new command. RebodyError, and nothing is reset, for options or a seed that is none."""
-        if options:
+        if options is not None and (not isinstance(options, Mapping) or options):
             raise RebodyError(f"reset options are {options!r}; this environment has none.")
         super().reset(seed=body_seed(seed))
         self._batch.reset(self.np_random)
