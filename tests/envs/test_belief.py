@@ -100,6 +100,75 @@ def test_nan_is_refused_and_none_is_not_heard():
         env.step(0)
 
 
+class Odd(gymnasium.Env):
+    """Pays what it is told to, and says nothing when it is reset."""
+
+    observation_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))
+    action_space = gymnasium.spaces.Discrete(2)
+    pays = 0.0
+
+    def reset(self, *, seed=None, options=None):
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action):
+        return np.zeros(1, np.float32), self.pays, False, False, {"x": 0.0}
+
+
+def test_an_environment_that_says_nothing_at_its_reset():
+    env = BeliefObservation(Odd(), "position", control_dt=0.1)
+    with pytest.raises(RebodyError, match="call reset"):
+        env.step(0)
+    for _ in range(2):  # nothing of a belief is left over either
+        with pytest.raises(RebodyError, match="at the start: the state lacks 'x'"):
+            env.reset()
+        with pytest.raises(RebodyError, match="call reset"):
+            env.step(0)
+
+
+@pytest.mark.parametrize("pays", [None, "much", [1.0, 2.0], np.zeros(2)])
+def test_a_reward_that_is_no_number(pays):
+    env = BeliefObservation(Odd(), "position", control_dt=0.1, observe=lambda observation, info: {"x": 0.0})
+    env.reset()
+    env.env.pays = pays
+    with pytest.raises(RebodyError, match=r"the environment's reward is .*; it must be a number"):
+        env.step(0)
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        (3.0, "the state is of type float; give a mapping"),
+        (None, "the state is of type NoneType"),
+        ({"x": np.zeros(2)}, r"the state's 'x' has shape \(2,\)"),
+        ({"x": "near"}, "the state's 'x' is 'near'"),
+        ({"x": None}, "the state lacks 'x'"),
+        ({}, "the state lacks 'x'"),
+    ],
+)
+def test_a_state_that_is_none(said, message):
+    env = BeliefObservation(Odd(), "position", control_dt=0.05, observe=lambda observation, info: states.pop(0))
+    states = [{"x": 0.0, "vx": None, "pitch": "of no matter"}, said, {"x": 0.1}]
+    env.reset()
+    env.step(0)
+    with pytest.raises(RebodyError, match=f"decision 1: {message}"):
+        env.step(0)
+    before = env.reading
+    for _ in range(2):  # a decision takes as many steps as ever
+        assert env.reading is before
+        env.step(0)
+    assert env.reading is not before
+
+
+def test_a_task_reward_that_is_an_array():
+    env = BeliefObservation(
+        Odd(), "position", control_dt=0.1, observe=lambda observation, info: {"x": 0.0},
+        task_reward=lambda observation, reward, info: np.zeros(1),
+    )  # fmt: skip
+    env.reset()
+    with pytest.raises(RebodyError, match=r"the reward has shape \(1,\); give one number"):
+        env.step(0)
+
+
 @pytest.mark.parametrize("control_dt", [0.0, -0.1, float("nan")])
 def test_a_step_takes_time(control_dt):
     with pytest.raises(RebodyError, match="control_dt is"):

@@ -2,6 +2,8 @@
 
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,13 +18,22 @@ COMMANDS = re.findall(r"^    \.venv/bin/rebody (.*)$", PAGE, re.MULTILINE)
 
 @pytest.mark.parametrize(
     ("block", "said"),
-    list(zip(BLOCKS, (r"^goal [56]\.\d+ ", r"^\(16,\) (goal|velocity)$"), strict=True)),
+    list(zip(BLOCKS[:2], (r"^goal [56]\.\d+ ", r"^\(16,\) (goal|velocity)$"), strict=True)),
     ids=["live", "environment"],
 )
 def test_python(block, said, capsys):
     """Twenty decisions say what is asked; after the one of the second block either family is a fair guess."""
     exec(block, {})
     assert re.search(said, capsys.readouterr().out)
+
+
+def test_processes(tmp_path):
+    """A program: those that are spawned read it."""
+    _, _, program = BLOCKS
+    (tmp_path / "program.py").write_text(program)
+    command = [sys.executable, str(tmp_path / "program.py")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    assert re.match(r"^\(2, 18\) \['(goal|velocity)' '(goal|velocity)'\]$", done.stdout)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

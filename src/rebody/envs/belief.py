@@ -21,6 +21,14 @@ TaskReward = Callable[[Any, float, dict[str, Any]], float | None]
 nothing was heard."""
 
 
+def _info(observation: Any, info: dict[str, Any]) -> Mapping[str, Any]:
+    return info
+
+
+def _reward(observation: Any, reward: float, info: dict[str, Any]) -> float:
+    return reward
+
+
 class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
     """Appends mean and standard deviation of the latent; they change once per decision of 0.1 s."""
 
@@ -30,8 +38,8 @@ class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
         inference: str = "goal-velocity",
         *,
         control_dt: float,
-        observe: Observe = lambda observation, info: info,
-        task_reward: TaskReward = lambda observation, reward, info: reward,
+        observe: Observe = _info,
+        task_reward: TaskReward = _reward,
     ):
         """`control_dt` is what a step of the environment lasts [s]; `inference` a shipped name or a folder.
 
@@ -51,6 +59,7 @@ class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
         self._inference = load_inference(inference)
         self._observe, self._task_reward = observe, task_reward
         self._belief: LiveBelief | None = None
+        self._rewards: list[float | None] = []
         self.observation_space = _with_belief(env.observation_space, self._inference.parts.module.encoder.latent)
 
     @property
@@ -69,29 +78,36 @@ class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
             raise RebodyError("nothing is believed before the first reset: call reset.")
         return self._belief
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
-        """Start anew and forget."""
+    def reset(self, *, seed: Any = None, options: Any = None):
+        """Start anew and forget; RebodyError where `observe` does not give what the module sees."""
         observation, info = self.env.reset(seed=seed, options=options)
+        self._belief, self._rewards = None, []
         self._belief = self._inference.begin(self._observe(observation, info))
-        self._rewards: list[float | None] = []
         return self._beside(observation), info
 
     def step(self, action: Any):
         """One step; the last of each decision changes the belief, which hears the mean of the rewards that there are.
 
-        RebodyError for a reward or a state that is no finite number.
+        RebodyError for a reward or a state that is no finite number, and before the first reset.
         """
+        belief = self._heard
         observation, reward, terminated, truncated, info = self.env.step(action)
-        self._rewards.append(inputs.reward(self._task_reward(observation, float(reward), info)))
+        self._rewards.append(inputs.reward(self._task_reward(observation, _number(reward), info)))
         if len(self._rewards) == self._per_decision:
-            heard = [reward for reward in self._rewards if reward is not None]
-            self._heard.update(self._observe(observation, info), float(np.mean(heard)) if heard else None)
-            self._rewards = []
+            heard, self._rewards = [reward for reward in self._rewards if reward is not None], []
+            belief.update(self._observe(observation, info), float(np.mean(heard)) if heard else None)
         return self._beside(observation), reward, terminated, truncated, info
 
     def _beside(self, observation: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n_and_twice_latent"]:
         both = [observation, np.asarray(self.reading.latent.features())]
         return np.concatenate(both).astype(self.observation_space.dtype)
+
+
+def _number(reward: Any) -> float:
+    try:
+        return float(reward)
+    except (TypeError, ValueError):
+        raise RebodyError(f"the environment's reward is {reward!r}; it must be a number.") from None
 
 
 def _with_belief(space: spaces.Box, latent: int) -> spaces.Box:

@@ -1,6 +1,7 @@
 """What an environment needs of bodies: any number of copies that reset one by one and step together."""
 
 from abc import ABC, abstractmethod
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -106,9 +107,18 @@ class Robots(Bodies):
         """`threads` = 0 uses every processor."""
         self.size = size
         self.actions = spec.model.nu
-        self._spec = spec
+        self._spec, self._threads = spec, threads
         self._batch = RobotBatch(spec, size, threads)
         self._past_qpos = np.zeros((spec.steps_per_decision + 1, size, spec.model.nq))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # MuJoCo's batch cannot be copied; the numbers that it continues from can
+        return vars(self) | {"_batch": self._batch.state}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._batch = RobotBatch(self._spec, self.size, self._threads)
+        self._batch.state = state["_batch"]
 
     @property
     def model(self) -> mujoco.MjModel:

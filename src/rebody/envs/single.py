@@ -8,7 +8,8 @@ import numpy as np
 
 from rebody import inputs
 from rebody.envs.bodies import Bodies
-from rebody.envs.world import DEFAULT_BASE_TASKS, World
+from rebody.envs.seeds import body_seed
+from rebody.envs.world import DEFAULT_BASE_TASKS, World, task_of_options
 from rebody.tasks import BaseTask
 
 
@@ -29,15 +30,22 @@ class TaskEnv(gymnasium.Env):
         self.observation_space = self._world.observation_space
         self.action_space = self._world.action_space
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
-        """Start anew; `options` may name the task: {"family": "goal", "target": -3.0}."""
-        super().reset(seed=seed)
-        self._world.reset(0, self.np_random, options)
+    def reset(self, *, seed: Any = None, options: Any = None):
+        """Start anew; `options` may name the task: {"family": "goal", "target": -3.0}.
+
+        RebodyError, and nothing is reset, for other options or a seed that is none.
+        """
+        task = task_of_options(options)
+        super().reset(seed=body_seed(seed))
+        self._world.reset(0, self.np_random, task)
         return self._world.observations()[0], self._info()
 
     def step(self, action: Any):
-        """One step with an action in [-1, 1]; larger ones are clipped. RebodyError for NaN or another shape."""
-        self._world.bodies.step(inputs.numbers(action, self._world.action_space.shape, "the action")[None])
+        """One step with an action in [-1, 1]; larger ones are clipped.
+
+        RebodyError, and nothing moves, for NaN or another shape, and before the first reset.
+        """
+        self._world.step(inputs.numbers(action, self._world.action_space.shape, "the action")[None])
         reward = float(self._world.rewards()[0])
         return self._world.observations()[0], reward, False, False, self._info()
 
@@ -46,7 +54,7 @@ class TaskEnv(gymnasium.Env):
         return self._world.pictures()[0] if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
-        """Release the camera; may be called twice."""
+        """Release the camera, which is all that is held; may be called twice."""
         self._world.close()
 
     def _info(self) -> dict[str, Any]:

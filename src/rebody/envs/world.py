@@ -15,7 +15,7 @@ from rebody.envs.bodies import Bodies
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
 from rebody.tasks import BaseTask, RewardForm, TaskDistribution, family_index, family_names, reward
-from rebody.types import GLOBAL_FIELDS, Task
+from rebody.types import GLOBAL_FIELDS, AnyArray, GlobalState, Task
 
 DEFAULT_BASE_TASKS = (
     BaseTask("goal", 0.5, 10.0),
@@ -37,8 +37,13 @@ class World:
         self._tasks = TaskDistribution(tuple(base_tasks))
         self._families = np.full(bodies.size, self._tasks.families[0], np.int32)
         self._targets = np.zeros(bodies.size)
-        self._reward = jax.jit(partial(reward, form=_form(reward_form)))
+        self._form = _form(reward_form)
+        self._begun = np.zeros(bodies.size, np.bool_)
         self._camera: Camera | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # a copy opens a camera of its own
+        return vars(self) | {"_camera": None}
 
     @property
     def observation_space(self) -> spaces.Box:
@@ -51,11 +56,18 @@ class World:
         """The action of one body."""
         return spaces.Box(-1.0, 1.0, (self.bodies.actions,), np.float32)
 
-    def reset(self, body: int, rng: np.random.Generator, options: Mapping[str, Any] | None = None) -> None:
-        """Put one body at its start and give it the task of the options, else a drawn one."""
-        task = task_of_options(options) if options else self._tasks.draw(rng)
+    def reset(self, body: int, rng: np.random.Generator, task: Task | None = None) -> None:
+        """Put one body at its start and give it that task, else a drawn one."""
+        task = self._tasks.draw(rng) if task is None else task
         self._families[body], self._targets[body] = task.family, task.target
         self.bodies.reset(body, rng)
+        self._begun[body] = True
+
+    def step(self, actions: Float[np.ndarray, "body action"]) -> None:
+        """One step of every body; RebodyError before each has been reset."""
+        if not self._begun.all():
+            raise RebodyError("there is no episode yet: call reset before step.")
+        self.bodies.step(actions)
 
     def observations(self) -> Float[np.ndarray, "body observation"]:
         """qpos with x, then qvel."""
@@ -65,7 +77,7 @@ class World:
     def rewards(self) -> Float[np.ndarray, " body"]:
         """The tasks' rewards of the last step."""
         task = Task(self._families, self._targets)
-        return np.asarray(self._reward(task, self.bodies.global_state()), np.float64)
+        return np.asarray(_reward(task, self.bodies.global_state(), self._form), np.float64)
 
     def info(self) -> dict[str, np.ndarray]:
         """Each body's task, which agents are not told, and its global state; arrays over bodies."""
@@ -80,13 +92,30 @@ class World:
         return tuple(self._camera.picture(qpos) for qpos in self.bodies.qpos)
 
     def close(self) -> None:
-        """Release the camera."""
+        """Release the camera; `pictures` opens another."""
         if self._camera:
             self._camera.close()
+        self._camera = None
 
 
-def task_of_options(options: Mapping[str, Any]) -> Task:
-    """The task that `reset(options=...)` asks for; RebodyError where it is not a family and a target."""
+@partial(jax.jit, static_argnames="form")
+def _reward(task: Task, state: GlobalState, form: RewardForm) -> Float[AnyArray, " body"]:
+    return reward(task, state, form)
+
+
+def task_of_options(options: Any) -> Task | None:
+    """The task that `reset(options=...)` asks for, None where it asks for none.
+
+    RebodyError where it is not a family and a target.
+    """
+    if options is None:
+        return None
+    if not isinstance(options, Mapping):
+        raise RebodyError(
+            f'reset options are {options!r}; give a mapping such as {{"family": "goal", "target": -3.0}}.'
+        )
+    if not options:
+        return None
     if options.keys() != {"family", "target"}:
         raise RebodyError(
             f"reset options are {', '.join(map(repr, options))}; give 'family' and 'target' together, "

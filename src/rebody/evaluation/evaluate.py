@@ -154,7 +154,9 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int, yardsticks: Yardst
 
 @own_jax_settings()
 def take_yardsticks(trial: Trial, specs: list[TaskSpec], seeds: int) -> Yardsticks:
-    """Oracle and idle in place of a trial's agent: none for a robot without a tracker. RebodyError as `evaluate`."""
+    """Oracle and idle in place of a trial's agent: none for a robot without a tracker, and no oracle where that has no
+    slot for a task. RebodyError as `evaluate`.
+    """
     check_trial(trial, specs)
     _check_size(trial, len(specs) * seeds)
     if trial.robot is not None and trial.tracker is None:
@@ -166,7 +168,7 @@ def take_yardsticks(trial: Trial, specs: list[TaskSpec], seeds: int) -> Yardstic
         other = replace(trial, agent=agent, thesis=False, stride=stride, on_frame=None)
         return run_trial(other, trial_agent(other, tasks), tasks, starts)
 
-    return Yardsticks(run("oracle"), run("idle"))
+    return Yardsticks(None if _without_slot(trial, specs) else run("oracle"), run("idle"))
 
 
 def start_seeds(specs: list[TaskSpec], seeds: Int[np.ndarray, " episode"]) -> list[int]:
@@ -265,6 +267,13 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
         return
     slots = trial.tracker.tracker.slots if trial.tracker else slots_of(trial.robot.reach)
     trial.contract.check_body(trial.robot.name, trial.robot.moving_fields, slots)
+    if trial.agent == "oracle" and (missing := _without_slot(trial, specs)):
+        # what the other agents are asked for, their module knows, and that fits the tracker
+        assert trial.tracker is not None
+        raise RebodyError(
+            f"agent 'oracle' is told {', '.join(missing)}, and tracker '{trial.tracker.name}' has no slot for that "
+            f"(it has {', '.join(slots)}). Choose tasks or a tracker that fit (rebody list)."
+        )
     for part in (trial.tracker, trial.flat, trial.scratch, trial.high_level, trial.step_predictor):
         if part is not None:
             check_robot_of(part, trial.robot)
@@ -277,6 +286,14 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
     if trial.step_predictor is not None:
         assert trial.tracker is not None
         check_step_predictor(trial.step_predictor, trial.tracker, trial.inference)
+
+
+def _without_slot(trial: Trial, specs: list[TaskSpec]) -> list[str]:
+    """Families of the tasks that a robot's tracker cannot be commanded in."""
+    if trial.tracker is None:
+        return []
+    asked = dict.fromkeys(family for spec in specs for family in (spec.family, spec.last.family))
+    return [family for family in asked if family not in trial.tracker.tracker.slots]
 
 
 def _check_size(trial: Trial, episodes: int) -> None:

@@ -1,5 +1,6 @@
 """What a tracker learns, as a plain Gymnasium environment: for other learners, and to compare them with ours."""
 
+from collections.abc import Mapping
 from functools import cached_property, partial
 from typing import Any
 
@@ -11,6 +12,8 @@ from gymnasium import spaces
 from rebody import inputs
 from rebody.bodies import RobotBatch, load_robot
 from rebody.control.tracker import Command, after, tracker_observation, tracker_reward
+from rebody.envs.seeds import body_seed
+from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
 from rebody.training.motion import motion_of
 from rebody.training.tracker.config import TrackerConfig
@@ -31,44 +34,63 @@ class TrackerEnv(gymnasium.Env):
         self._spec = load_robot(robot)
         self._config = config or tracker_preset(self._spec)
         self._batch = RobotBatch(self._spec, 1, threads=1)
+        self._command: Command | None = None
         self.action_space = spaces.Box(-1.0, 1.0, (self._spec.model.nu,), np.float32)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # MuJoCo's batch cannot be copied; the numbers that it continues from can
+        return vars(self) | {"_batch": self._batch.state}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._batch = RobotBatch(self._spec, 1, threads=1)
+        self._batch.state = state["_batch"]
 
     @cached_property
     @own_jax_settings()
     def observation_space(self) -> spaces.Box:
         """Joint state, then the command."""
-        size = len(self._observe(Command(np.zeros(1, np.int32), np.zeros(1, np.float32))))
-        return spaces.Box(-np.inf, np.inf, (size,), np.float32)
+        nothing = Command(np.zeros(1, np.int32), np.zeros(1, np.float32))
+        # the shape alone: a process in which JAX has computed cannot be forked any more
+        seen = jax.eval_shape(lambda told: _observation(self._batch.tracker_state(), told, self._config), nothing)
+        return spaces.Box(-np.inf, np.inf, seen.shape[1:], np.float32)
 
     @own_jax_settings()
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
-        """The rest pose, and a new command."""
-        super().reset(seed=seed)
+    def reset(self, *, seed: Any = None, options: Any = None):
+        """The rest pose, and a new command. RebodyError, and nothing is reset, for options or a seed that is none."""
+        if options is not None and (not isinstance(options, Mapping) or options):
+            raise RebodyError(f"reset options are {options!r}; this environment has none.")
+        super().reset(seed=body_seed(seed))
         self._batch.reset(self.np_random)
-        self._new_command()
+        self._command = self._new_command()
         return self._observe(self._command), {}
 
     @own_jax_settings()
     def step(self, action: Any):
-        """One control step with an action in [-1, 1]; larger ones are clipped."""
+        """One control step with an action in [-1, 1]; larger ones are clipped.
+
+        RebodyError, and nothing moves, for NaN or another shape, and before the first reset.
+        """
+        told, config = self._command, self._config
+        if told is None:
+            raise RebodyError("there is no episode yet: call reset before step.")
         action = inputs.numbers(action, (self._spec.model.nu,), "the action")
         before = self._batch.qpos.copy()
         self._batch.step(action[None])
         motion = motion_of(self._batch, before)
-        told, config = self._command, self._config
         reward = _reward(told, motion, action.astype(np.float32)[None], self._spec.control_dt, config)
-        self._command = jax.tree.map(np.asarray, after(told, motion))
+        command: Command = jax.tree.map(np.asarray, after(told, motion))
         self._steps_left -= 1
-        if self._steps_left < 0:
-            self._new_command()
-        return self._observe(self._command), float(reward[0]), bool(motion.fell[0]), False, {}
+        self._command = command = self._new_command() if self._steps_left < 0 else command
+        return self._observe(command), float(reward[0]), bool(motion.fell[0]), False, {}
 
-    def _new_command(self) -> None:
+    def _new_command(self) -> Command:
         key = jax.random.key(self.np_random.integers(2**32, dtype=np.uint32))
         pitch = self._spec.pitch(self._batch.qpos).astype(np.float32)
-        self._command = jax.tree.map(np.asarray, draw_commands(key, pitch, self._config))
+        command = jax.tree.map(np.asarray, draw_commands(key, pitch, self._config))
         shortest, longest = segment_steps(self._config, self._spec.control_dt)
         self._steps_left = int(self.np_random.integers(shortest, longest + 1))
+        return command
 
     def _observe(self, command: Command) -> np.ndarray:
         joints = self._batch.tracker_state()
