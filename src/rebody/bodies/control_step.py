@@ -5,6 +5,8 @@ import math
 from rebody.errors import RebodyError
 from rebody.types import DECISION_DT
 
+SHORTEST = 1e-5
+"""Shortest time step [s]: shorter ones take hours for a second, or are none at all."""
 MOST_STEPS = 20
 """Control steps of a decision that are proposed."""
 MICROSECOND = 1e-6
@@ -16,11 +18,12 @@ def steps_per_decision(robot: str, frame_skip: int, timestep: float) -> int:
 
     RebodyError that names what would do where they do not divide it.
     """
-    step = frame_skip * timestep
-    if not 0 < step < math.inf:
+    if not SHORTEST <= timestep < math.inf:
         raise RebodyError(
-            f"robot '{robot}': its time step is {timestep:g} s; set timestep in its TOML file, such as 0.01."
+            f"robot '{robot}': its time step is {timestep:g} s, and must be at least {SHORTEST:g} s: set timestep in its "
+            "TOML file."
         )
+    step = frame_skip * timestep
     steps = round(DECISION_DT / step)
     if steps < 1 or abs(steps * step - DECISION_DT) > 1e-9:
         raise RebodyError(
