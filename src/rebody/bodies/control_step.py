@@ -20,8 +20,8 @@ def steps_per_decision(robot: str, frame_skip: int, timestep: float) -> int:
     """
     if not SHORTEST <= timestep < math.inf:
         raise RebodyError(
-            f"robot '{robot}': its time step is {timestep:g} s, and must be at least {SHORTEST:g} s: set timestep in its "
-            "TOML file."
+            f"robot '{robot}': its time step is {timestep:g} s, and must be at least {SHORTEST:g} s: set timestep in "
+            "its TOML file."
         )
     step = frame_skip * timestep
     steps = round(DECISION_DT / step)

@@ -211,10 +211,10 @@ class RobotSpec:
         return self.model.jnt_qposadr[self.model.jnt_type == _FREE]
 
     @cached_property
-    def _quaternions(self) -> list[int]:
+    def _quaternions(self) -> Int[np.ndarray, " quaternion"]:
         """Where orientations begin in qpos."""
         kind, first = self.model.jnt_type, self.model.jnt_qposadr
-        return [*first[kind == _BALL], *(first[kind == _FREE] + 3)]
+        return np.concatenate([first[kind == _BALL], first[kind == _FREE] + 3])
 
     def pitch(self, qpos: Floats) -> Floats:
         """Pitch of the root body, in (-pi, pi] [rad]."""

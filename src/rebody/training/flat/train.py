@@ -59,7 +59,8 @@ def train_flat(
 ) -> Path:
     """Train a flat policy; returns the artifact's folder.
 
-    RebodyError if the robot is not ready, `out` holds another run, or module and robot do not fit; Interrupted on Ctrl-C.
+    RebodyError if the robot is not ready, `out` holds another run, or module and robot do not fit; Interrupted on
+    Ctrl-C.
     """
     check_ranges(config)
     spec, module = load_robot(robot), load_inference(inference)

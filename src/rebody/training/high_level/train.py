@@ -70,7 +70,8 @@ def train_high_level(
 ) -> Path:
     """Train a high-level policy for a tracker, by default `tracker-ROBOT`; returns the artifact's folder.
 
-    RebodyError if the robot is not ready, `out` holds another run, or module, tracker and robot do not fit; Interrupted on Ctrl-C.
+    RebodyError if the robot is not ready, `out` holds another run, or module, tracker and robot do not fit; Interrupted
+    on Ctrl-C.
     """
     check_ranges(config)
     spec, module = load_robot(robot), load_inference(inference)

@@ -85,7 +85,8 @@ def train_scratch(
 ) -> Path:
     """Train module and policy; returns the artifact's folder.
 
-    RebodyError if the robot is not ready, `out` holds another run, or `init_from` has other sizes; Interrupted on Ctrl-C.
+    RebodyError if the robot is not ready, `out` holds another run, or `init_from` has other sizes; Interrupted on
+    Ctrl-C.
     """
     check_ranges(config)
     spec = load_robot(robot)

@@ -59,7 +59,8 @@ def train_step_predictor(
 ) -> Path:
     """Train a step predictor for a tracker, by default `tracker-ROBOT`; returns the artifact's folder.
 
-    RebodyError if the robot is not ready, `out` holds another run, or robot, tracker and `init_from` do not fit; Interrupted on Ctrl-C.
+    RebodyError if the robot is not ready, `out` holds another run, or robot, tracker and `init_from` do not fit;
+    Interrupted on Ctrl-C.
     """
     check_ranges(config)
     if config.steps < MOST_STEPS:

@@ -69,8 +69,8 @@ def train_tracker(
 ) -> Path:
     """Train a tracker; returns the artifact's folder.
 
-    RebodyError if the robot is not ready, `out` holds another run, `init_from` has other sizes, or the robot has no such slot as the only one
-    asked for; Interrupted on Ctrl-C.
+    RebodyError if the robot is not ready, `out` holds another run, `init_from` has other sizes, or the robot has no
+    such slot as the only one asked for; Interrupted on Ctrl-C.
     """
     check_ranges(config)
     spec = load_robot(robot)
