@@ -61,3 +61,35 @@ def test_osmesa_that_is_missing_is_one_message(headless, monkeypatch):
     with pytest.raises(RebodyError, match="Set MUJOCO_GL to egl or osmesa"):
         camera.Camera(load_robot("cheetah").model)
     assert os.environ.pop("MUJOCO_GL") == "osmesa"
+
+
+# models without a camera called `track`
+
+COLOURED = ('type="box" size="0.3 0.1 0.1"', 'type="box" size="0.3 0.1 0.1" rgba="1 0.2 0.2 1"')
+BOX_FLOOR = ('type="plane" size="9 9 1"', 'type="box" size="99 99 1" pos="0 0 -1"')
+LIT_FLOOR = [
+    ('type="plane"', 'type="plane" material="grid"'),
+    ("<worldbody>", '<asset><material name="grid"/></asset><worldbody><light pos="0 0 3"/>'),
+]
+STANDING = ("<worldbody>", '<worldbody><camera name="track" pos="0 -3 1" xyaxes="1 0 0 0 0.3 1"/>')
+SMALL_BUFFER = ("<worldbody>", '<visual><global offwidth="32" offheight="32"/></visual><worldbody>')
+
+
+@pytest.mark.parametrize("mjcf", [[], [BOX_FLOOR], LIT_FLOOR, [STANDING], [SMALL_BUFFER]])
+def test_the_picture_follows_the_root_of_a_model_without_a_camera(mjcf, write_own):
+    spec = load_robot(write_own(mjcf=[COLOURED, *mjcf]))
+    view = camera.Camera(spec.model, 64, 48, spec.root_body)
+    for x in (0.0, 20.0):
+        red, _, blue = np.moveaxis(view.picture(spec.rest_qpos + np.array([x, 0, 0, 0])).astype(int), -1, 0)
+        rows, columns = np.nonzero(red - blue > 40)
+        assert 0.01 < len(rows) / red.size < 0.3
+        assert abs(columns.mean() - 32) < 4
+        assert abs(rows.mean() - 24) < 6
+    view.close()
+
+
+def test_drawing_leaves_the_model_as_it_is(write_own):
+    model = load_robot(write_own()).model
+    before = model.stat.extent, model.vis.headlight.ambient.tolist(), model.geom_size.tolist()
+    camera.Camera(model, 64, 48).close()
+    assert (model.stat.extent, model.vis.headlight.ambient.tolist(), model.geom_size.tolist()) == before

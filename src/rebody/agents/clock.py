@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from rebody.agents.agent import Agent, Carry, Command, Observation
-from rebody.bodies.robot import RobotBatch
+from rebody.bodies import RobotBatch
 from rebody.control.step_predictor import StepPredictor
 from rebody.control.tracker import relative
 from rebody.types import AnyArray, GlobalState, Subgoal

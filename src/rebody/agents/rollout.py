@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 from rebody.agents.agent import Agent, Observation
 from rebody.agents.clock import Clock, EvenClock, place
 from rebody.agents.controller import Controller
-from rebody.bodies.robot import RobotBatch, RobotSpec
+from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.toys import Disturbance, Toy
 from rebody.tasks import RewardForm, reward
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task

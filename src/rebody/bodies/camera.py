@@ -13,10 +13,14 @@ import mujoco.rendering.classic.gl_context as gl_context
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from rebody.bodies.model import carried_by
 from rebody.errors import RebodyError
 
 NOT_DRAWN = (RuntimeError, mujoco.FatalError, ImportError, AttributeError)
 """What MuJoCo and PyOpenGL raise where OpenGL is switched off (MUJOCO_GL=off), missing, or has no display."""
+
+SIZES_AWAY = 3.0
+"""Distance of a camera that is ours, in sizes of the body."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +32,14 @@ class Pole:
 
 
 class Camera:
-    """Draws a model from the camera that it calls `track`."""
+    """Draws a model from its own camera `track`, or from the side where it has none that moves with the body."""
 
-    def __init__(self, model: mujoco.MjModel, width: int = 640, height: int = 480):
-        """Size in pixels, at most the model's offscreen buffer; RebodyError where nothing can be drawn."""
-        model = _with_endless_floor(model)
+    def __init__(self, model: mujoco.MjModel, width: int = 640, height: int = 480, root: int = 1):
+        """Size in pixels; `root` is the id of the body that is followed. RebodyError where nothing can be drawn."""
+        model = _drawable(model, width, height)
         self._data = mujoco.MjData(model)
+        self._root = root
+        self._view = _view(model, root)
         try:
             choose_opengl()
             self._renderer = mujoco.Renderer(model, height, width)
@@ -49,7 +55,9 @@ class Camera:
         """The body at these joint positions, with poles that mark places along x."""
         self._data.qpos[:] = qpos
         mujoco.mj_forward(self._renderer.model, self._data)
-        self._renderer.update_scene(self._data, "track")
+        if self._view.type == mujoco.mjtCamera.mjCAMERA_FREE:
+            self._view.lookat[:] = self._data.xpos[self._root]
+        self._renderer.update_scene(self._data, self._view)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False  # halves the time of a frame
         for pole in poles:
             _plant(self._renderer.scene, pole)
@@ -58,6 +66,31 @@ class Camera:
     def close(self) -> None:
         """Release what OpenGL holds; may be called twice."""
         self._renderer.close()
+
+
+def _view(model: mujoco.MjModel, root: int) -> mujoco.MjvCamera:
+    """The model's camera `track`, unless it stays where it is; else one beside the body, at a distance for its size."""
+    view = mujoco.MjvCamera()
+    track = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, "track")
+    if track >= 0 and model.cam_bodyid[track] != 0:
+        view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, track
+        return view
+    view.type, size = mujoco.mjtCamera.mjCAMERA_FREE, _size(model, root)
+    view.azimuth, view.elevation, view.distance = 90.0, -15.0, SIZES_AWAY * size
+    model.stat.extent = min(model.stat.extent, SIZES_AWAY * size)  # what is nearer than a share of it is not drawn
+    return view
+
+
+def _size(model: mujoco.MjModel, root: int) -> float:
+    """How far a body's parts reach from its origin as they are modelled [m]; that of the whole model if it has none.
+
+    A floor may be a box as large as a field, and counts in MuJoCo's own extent.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    own = carried_by(model, root)[model.geom_bodyid]
+    reach = np.linalg.norm(data.geom_xpos[own] - data.xpos[root], axis=-1) + model.geom_rbound[own]
+    return float(reach.max(initial=0.0)) or model.stat.extent
 
 
 def _plant(scene: mujoco.MjvScene, pole: Pole) -> None:
@@ -89,12 +122,20 @@ def _loads(library: str) -> bool:
     return True
 
 
-def _with_endless_floor(model: mujoco.MjModel) -> mujoco.MjModel:
-    # Gymnasium's floors end after 40 m for the eye only; a robot runs further
+def _drawable(model: mujoco.MjModel, width: int, height: int) -> mujoco.MjModel:
+    """A copy with room for the picture, in the light, on a floor without end.
+
+    Gymnasium's floors end after 40 m for the eye only; a robot runs further.
+    """
     model = copy.copy(model)
+    buffer, lamp = model.vis.global_, model.vis.headlight
+    buffer.offwidth, buffer.offheight = max(buffer.offwidth, width), max(buffer.offheight, height)
+    if not model.nlight:  # MuJoCo's headlight alone leaves it in the dark
+        lamp.ambient[:], lamp.diffuse[:] = 0.4, 0.6
     ends = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_size[:, 0] > 0)
     for plane in np.flatnonzero(ends):
-        # an endless plane counts its texture's repeats per metre
-        model.mat_texrepeat[model.geom_matid[plane]] /= 2 * model.geom_size[plane, :2]
+        if (material := model.geom_matid[plane]) >= 0:
+            # an endless plane counts its texture's repeats per metre
+            model.mat_texrepeat[material] /= 2 * model.geom_size[plane, :2]
         model.geom_size[plane, :2] = 0.0
     return model

@@ -1,113 +1,143 @@
-"""Is a robot's description fit for use? Loads it, runs it, and says what is missing."""
+"""Is a robot's description fit for use? Loads it, runs it, and says what is missing.
 
-from dataclasses import dataclass
+`rebody robot check` prints all that was found; training refuses a robot of which something is wrong.
+"""
+
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from rebody.bodies.robot import RobotBatch, RobotSpec
+from rebody.bodies.batch import RobotBatch
+from rebody.bodies.check_model import Finding, check_model
+from rebody.bodies.model import NOT_USED, carried_by
+from rebody.bodies.robot import RobotSpec
 from rebody.errors import RebodyError
 
 SECONDS = 5.0
 """How long it is run."""
+COPIES = 8
 FAR = 1e3
 """Nothing gets farther than this in that time, in m or rad, but a simulation that is about to diverge."""
 
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing that was looked at."""
-
-    subject: str
-    is_right: bool
-    says: str
+Look = Callable[[RobotSpec], tuple[bool, str]]
+"""Looks at one thing of a robot: whether it is right, and what to say of it."""
 
 
 def check_robot(spec: RobotSpec) -> list[Finding]:
     """All that was found; RebodyError if the model cannot even be loaded."""
-    findings = [_control_rate(spec), *_root(spec)]
-    if not all(finding.is_right for finding in findings):
-        return findings  # running it would fail for the same reasons
-    findings += [_actuators(spec), _rest_pose(spec)]
-    return [*findings, _run(spec, "does nothing", 0.0), _run(spec, "moves at random", 1.0), _forward(spec)]
-
-
-def _control_rate(spec: RobotSpec) -> Finding:
-    model = spec.model
-    try:
-        steps = spec.steps_per_decision
-    except RebodyError as error:
-        return Finding("control step", False, str(error))
-    says = f"{spec.frame_skip} x {model.opt.timestep:g} s = {spec.control_dt:g} s, {steps} to a decision"
-    return Finding("control step", True, says)
-
-
-def _root(spec: RobotSpec) -> list[Finding]:
-    """The observation mapping: which joints carry x, z and pitch."""
-    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
-    wanted = (("x", slide, 0, "slide along x"), ("z", slide, 2, "slide along z"), ("pitch", hinge, 1, "hinge about y"))
-    names = [spec.model.joint(i).name for i in range(spec.model.njnt)]
-    data = mujoco.MjData(spec.model)
-    mujoco.mj_forward(spec.model, data)  # axes in the world: a body may be turned in its model
-    findings = []
-    for joint, (field, kind, axis, what) in zip(spec.root_joints, wanted, strict=True):
-        if joint not in names:
-            says = f"the model has no joint '{joint}'; its joints are {', '.join(names)}"
-            findings.append(Finding(field, False, says))
-            continue
-        found = spec.model.joint(joint)
-        is_right = found.type[0] == kind and data.xaxis[found.id][axis] > 0.99
-        findings.append(Finding(field, bool(is_right), f"joint '{joint}'" + ("" if is_right else f" is no {what}")))
+    findings = check_model(spec)
+    stages = ({"does nothing": _does_nothing, "moves at random": _moves_at_random}, _IN_USE)
+    for looks in stages:
+        if not all(finding.is_right for finding in findings):
+            return findings  # what comes would fail for the same reasons
+        findings += [_finding(subject, look, spec) for subject, look in looks.items()]
     return findings
 
 
-def _actuators(spec: RobotSpec) -> Finding:
-    model = spec.model
-    unlimited = [model.actuator(i).name or str(i) for i in range(model.nu) if not model.actuator_ctrllimited[i]]
-    if model.nu == 0:
-        return Finding("actuators", False, "the model has none")
-    if unlimited:
-        return Finding("actuators", False, f"no ctrlrange: {', '.join(unlimited)}; actions in [-1, 1] are scaled to it")
-    return Finding("actuators", True, f"{model.nu}, each with a control range")
+def require_ready(spec: RobotSpec) -> None:
+    """RebodyError that says all that is wrong with a robot, before anything is trained on it."""
+    wrong = [f"{finding.subject}: {finding.says}" for finding in check_robot(spec) if not finding.is_right]
+    if wrong:
+        raise RebodyError(f"robot '{spec.name}' is not ready. " + "; ".join(wrong))
 
 
-def _rest_pose(spec: RobotSpec) -> Finding:
-    lies = bool(spec.lies(spec.model.qpos0[None])[0])
-    height = f"torso {spec.torso_height:.3g} m above the floor"
-    return Finding("rest pose", not lies, f"{height}: counts as fallen, see [fall]" if lies else height)
+def _finding(subject: str, look: Look, spec: RobotSpec) -> Finding:
+    try:
+        return Finding(subject, *look(spec))
+    except (RebodyError, *NOT_USED) as error:
+        return Finding(subject, False, str(error))
 
 
-def _run(spec: RobotSpec, what: str, amplitude: float) -> Finding:
-    rng, batch = np.random.default_rng(0), RobotBatch(spec, 8, threads=1)
+def _does_nothing(spec: RobotSpec) -> tuple[bool, str]:
+    return _run(spec, 0.0)
+
+
+def _moves_at_random(spec: RobotSpec) -> tuple[bool, str]:
+    return _run(spec, 1.0)
+
+
+def _run(spec: RobotSpec, amplitude: float) -> tuple[bool, str]:
+    rng, batch = np.random.default_rng(0), RobotBatch(spec, COPIES, threads=1)
     batch.reset(rng)
     steps, fell_at = round(SECONDS / spec.control_dt), None
     for step in range(steps):
-        try:
-            batch.step(rng.uniform(-amplitude, amplitude, (batch.size, spec.model.nu)))
-        except RebodyError as error:
-            return Finding(what, False, str(error))
+        batch.step(rng.uniform(-amplitude, amplitude, (batch.size, spec.model.nu)))
         if fell_at is None and batch.fallen.any():
             fell_at = (step + 1) * spec.control_dt
-    is_sound = _is_sound(batch.qpos)
+    if not _is_sound(batch.qpos):
+        return False, "positions run away: lower the time step"
     fall = "no copy fell" if fell_at is None else f"first of {batch.size} copies fallen after {fell_at:.2g} s"
-    return Finding(what, is_sound, f"{SECONDS:g} s, {fall}" if is_sound else "positions run away: lower the time step")
+    return True, f"{SECONDS:g} s, {fall}"
 
 
-def _forward(spec: RobotSpec) -> Finding:
+def _is_sound(qpos: Float[np.ndarray, "robot nq"]) -> bool:
+    return bool(np.isfinite(qpos).all() and np.abs(qpos).max() < FAR)
+
+
+def _floor(spec: RobotSpec) -> tuple[bool, str]:
+    """Once it has settled, something of it touches what does not move; a hop must come down in half the time."""
+    model, data = spec.model, mujoco.MjData(spec.model)
+    data.qpos[:], data.ctrl[:] = spec.rest_qpos, model.actuator_ctrlrange.mean(axis=1)
+    steps = round(SECONDS / spec.control_dt)
+    for step in range(steps):
+        mujoco.mj_step(model, data, spec.frame_skip)
+        if step >= steps // 2 and (touched := _touched(spec, data)) is not None:
+            return True, f"stands on {touched}"
+    return False, f"nothing of it touches a geom of the world after {SECONDS:g} s without action: add a floor"
+
+
+def _touched(spec: RobotSpec, data: mujoco.MjData) -> str | None:
+    """Name of a geom of the world that bears the robot."""
+    model, geoms = spec.model, data.contact.geom[data.contact.efc_address >= 0]
+    is_robot = carried_by(model, spec.root_body)[model.geom_bodyid]
+    is_world = model.body_weldid[model.geom_bodyid] == 0
+    for geom, other in (*geoms, *geoms[:, ::-1]):
+        if is_robot[geom] and is_world[other]:
+            return f"'{model.geom(other).name}'" if model.geom(other).name else "a geom without a name"
+    return None
+
+
+def _pushed_forward(spec: RobotSpec) -> tuple[bool, str]:
     """A push forward shows in the global state as it should."""
     batch = RobotBatch(spec, 1, threads=1)
     batch.reset(np.random.default_rng(0))
     before = batch.qpos.copy()
     batch.push(np.ones(1))
-    try:
-        for _ in range(spec.steps_per_decision):
-            batch.step(np.zeros((1, spec.model.nu)))
-    except RebodyError as error:
-        return Finding("readout", False, str(error))
+    for _ in range(spec.steps_per_decision):
+        batch.step(np.zeros((1, spec.model.nu)))
     speed = float(spec.observe(batch.qpos, before).vx[0])
-    return Finding("readout", speed > 0, f"pushed by 1 m/s, it reads {speed:.2f} m/s over the first decision")
+    return speed > 0, f"pushed by 1 m/s, it reads {speed:.2f} m/s over the first decision"
 
 
-def _is_sound(qpos: Float[np.ndarray, "robot nq"]) -> bool:
-    return bool(np.isfinite(qpos).all() and np.abs(qpos).max() < FAR)
+def _trained(spec: RobotSpec) -> tuple[bool, str]:
+    """All that training calls: what is read is finite, and a saved state continues to the last bit, as does a reset."""
+    rng, batch, twin = np.random.default_rng(0), RobotBatch(spec, COPIES, 1), RobotBatch(spec, COPIES, 1)
+    batch.reset(rng)
+    before, actions = batch.qpos.copy(), rng.uniform(-1, 1, (2, spec.steps_per_decision, COPIES, spec.model.nu))
+    batch.push(rng.uniform(-1, 1, COPIES))
+    _act(batch, actions[0])
+    twin.state = batch.state
+    if not np.array_equal(_act(batch, actions[1]), _act(twin, actions[1])):
+        return False, "a state that was saved does not continue as it did: the model keeps some of it elsewhere"
+    seen = spec.observe(batch.qpos, before)
+    read = (batch.tracker_state(), batch.joint_state(), batch.pace, seen.x, seen.z, seen.pitch, seen.vx, seen.vz)
+    if not all(np.isfinite(numbers).all() for numbers in (*read, seen.pitch_rate)):
+        return False, "what is read of it is not finite"
+    batch.reset(np.random.default_rng(1))
+    twin = RobotBatch(spec, COPIES, 1)
+    twin.reset(np.random.default_rng(1))
+    if not np.array_equal(_act(batch, actions[0]), _act(twin, actions[0])):
+        return False, "after a reset it does not move as a new one: the model keeps some of its state"
+    return True, f"a tracker sees {spec.tracker_inputs} numbers; saved states continue to the last bit"
+
+
+def _act(batch: RobotBatch, actions: Float[np.ndarray, "step robot nu"]) -> Float[np.ndarray, "robot state"]:
+    """The state after these actions."""
+    for action in actions:
+        batch.step(action)
+    return batch.state
+
+
+_IN_USE: dict[str, Look] = {"floor": _floor, "readout": _pushed_forward, "training": _trained}

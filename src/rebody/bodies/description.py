@@ -44,6 +44,8 @@ class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     root: _Root
     fall: _Fall
     reach: _Reach
+    rest: dict[str, float] = {}
+    timestep: float | None = None
     reset_noise: float = 0.01
     smoothing_s: float = 0.0
     goal_ahead: float = math.inf
@@ -76,6 +78,8 @@ def _read(path: Path) -> RobotSpec:
         mjcf=_mjcf(description.mjcf, path),
         frame_skip=description.frame_skip,
         root=_root(description.root, path),
+        timestep=description.timestep,
+        rest=tuple(description.rest.items()),
         reset_noise=description.reset_noise,
         smoothing_s=description.smoothing_s,
         goal_ahead=description.goal_ahead,
@@ -107,6 +111,10 @@ def _check_values(spec: RobotSpec, path: Path) -> None:
     problems = []
     if spec.frame_skip < 1:
         problems.append("frame_skip must be at least 1")
+    if spec.timestep is not None and not 0 < spec.timestep < math.inf:
+        problems.append("timestep must be positive")
+    if not all(math.isfinite(position) for _, position in spec.rest):
+        problems.append("[rest] positions must be finite")
     if not spec.reset_noise >= 0:
         problems.append("reset_noise must not be negative")
     if not spec.smoothing_s >= 0:

@@ -1,39 +1,24 @@
-"""Robots: a description each, and many of them stepped at once by MuJoCo's own batch engine.
-
-The only file that knows `mujoco.batch`.
-"""
+"""Robots: a description each, and what it means: how a joint state becomes a global state, and when one has fallen."""
 
 import math
-import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import mujoco
-import mujoco.batch
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
+from rebody.bodies.control_step import steps_per_decision
+from rebody.bodies.model import PLANE_JOINTS, compile_model
 from rebody.errors import RebodyError
 from rebody.ranges import Finite, Positive
 from rebody.types import DECISION_DT, GlobalState
 
 Floats = Float[np.ndarray, "..."]
 
-# MuJoCo counts these and then resets the simulation by itself: its state looks healthy afterwards
-_DIVERGED = [
-    int(warning)
-    for warning in (
-        mujoco.mjtWarning.mjWARN_BADQPOS,
-        mujoco.mjtWarning.mjWARN_BADQVEL,
-        mujoco.mjtWarning.mjWARN_BADQACC,
-        mujoco.mjtWarning.mjWARN_BADCTRL,
-    )
-]
-
-
-PLANE_JOINTS = ("rebody-x", "rebody-z", "rebody-pitch")
-"""Joints of a root body that is held to the plane."""
+_FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
+_SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
 @dataclass(frozen=True)
@@ -103,25 +88,17 @@ class RobotSpec:
     smoothing_s: float = 0.0
     """Time constant of the pace, the mean speed that a tracker sees and is paid by [s]; 0 for the speed of a step. A
     robot that hops or walks moves unevenly: paid by every step, it does best by going slower than it is told."""
+    timestep: float | None = None
+    """Seconds of a simulation step; None for what the model says."""
+    rest: tuple[tuple[str, float], ...] = ()
+    """Joints that rest elsewhere than in the model, and where [m, rad]."""
     moving_fields: tuple[str, ...] = ("x", "z", "pitch", "vx", "vz", "pitch_rate")
     """Fields of the global state that this body can move."""
 
     @cached_property
     def model(self) -> mujoco.MjModel:
-        """The compiled model."""
-        try:
-            spec = mujoco.MjSpec.from_file(str(self.mjcf))
-        except ValueError as error:
-            raise RebodyError(f"robot '{self.name}': MuJoCo cannot read '{self.mjcf}': {error}") from error
-        if isinstance(self.root, str):
-            _hold_to_plane(spec, self.root, self.name)
-        with warnings.catch_warnings():
-            # what MuJoCo advises instead of the cheetah's `settotalmass` changes the last bits of its physics
-            warnings.filterwarnings("ignore", message="compiler attribute 'settotalmass'")
-            try:
-                return spec.compile()
-            except ValueError as error:
-                raise RebodyError(f"robot '{self.name}': MuJoCo cannot use '{self.mjcf}': {error}") from error
+        """The compiled model; RebodyError where MuJoCo cannot use it."""
+        return compile_model(self.name, self.mjcf, self.root, self.timestep)
 
     @cached_property
     def control_dt(self) -> float:
@@ -131,14 +108,7 @@ class RobotSpec:
     @cached_property
     def steps_per_decision(self) -> int:
         """Control steps of one decision; RebodyError where they do not divide it."""
-        steps = round(DECISION_DT / self.control_dt)
-        if steps < 1 or abs(steps * self.control_dt - DECISION_DT) > 1e-9:
-            raise RebodyError(
-                f"robot '{self.name}': a control step of {self.control_dt:g} s does not divide a decision "
-                f"of {DECISION_DT} s. Choose a frame_skip so that it does "
-                f"(time step {self.model.opt.timestep:g} s)."
-            )
-        return steps
+        return steps_per_decision(self.name, self.frame_skip, self.model.opt.timestep)
 
     @property
     def root_joints(self) -> tuple[str, str, str]:
@@ -157,10 +127,31 @@ class RobotSpec:
         return int(self.model.joint(self.root_joints[0]).dofadr[0])
 
     @cached_property
+    def root_body(self) -> int:
+        """Id of the body that pitch turns."""
+        return int(self.model.joint(self.root_joints[2]).bodyid[0])
+
+    @cached_property
+    def rest_qpos(self) -> Float[np.ndarray, " nq"]:
+        """Joint positions of the rest pose; RebodyError where `rest` names what is no slide or hinge."""
+        model, qpos = self.model, self.model.qpos0.copy()
+        joints = {model.joint(i).name: i for i in range(model.njnt) if model.jnt_type[i] in (_SLIDE, _HINGE)}
+        for name, position in self.rest:
+            if name not in joints:
+                raise RebodyError(
+                    f"robot '{self.name}': [rest] names '{name}', which is no slide or hinge of its model; "
+                    f"those are {', '.join(filter(None, joints))}."
+                )
+            qpos[model.jnt_qposadr[joints[name]]] = position
+        return qpos
+
+    @cached_property
     def torso_height(self) -> float:
         """Height of the root body above the floor in the rest pose [m]."""
-        x_joint = self.model.joint(self.root_joints[0])
-        return float(self.model.body_pos[self.model.jnt_bodyid[x_joint.id]][2])
+        data = mujoco.MjData(self.model)
+        data.qpos[:] = self.rest_qpos
+        mujoco.mj_kinematics(self.model, data)
+        return float(data.xpos[self.root_body][2])
 
     def observe(self, qpos: Floats, previous_qpos: Floats) -> GlobalState:
         """Global state from the joint positions of this decision and of the one before."""
@@ -184,9 +175,17 @@ class RobotSpec:
         return np.asarray(pace + share * (moved / self.control_dt - pace))
 
     def joint_state(self, qpos: Floats, qvel: Floats) -> Float[np.ndarray, "... joint"]:
-        """Positions without x, pitch wrapped, then velocities of like size."""
+        """Positions without x, pitch wrapped, then velocities of like size.
+
+        Bodies that float freely beside the robot stand at their x ahead of it; of the two quaternions of an
+        orientation it is the one with a real part that is not negative.
+        """
         x, _, pitch = self.root_addresses
-        positions = qpos.astype(np.float32)
+        positions = qpos.copy()
+        positions[..., self._others_x] -= qpos[..., [x]]
+        for first in self._quaternions:
+            positions[..., first : first + 4] *= np.where(qpos[..., first, None] < 0, -1.0, 1.0)
+        positions = positions.astype(np.float32)
         positions[..., pitch] = wrap_angle(positions[..., pitch])
         velocities = (qvel * self._velocity_scale).astype(np.float32)
         return np.concatenate([np.delete(positions, x, axis=-1), velocities], axis=-1)
@@ -199,10 +198,23 @@ class RobotSpec:
         return np.concatenate([joints, np.asarray(pace, np.float32)[..., None]], axis=-1)
 
     @cached_property
-    def _velocity_scale(self) -> Floats:
+    def _velocity_scale(self) -> Float[np.ndarray, " nv"]:
         # a leg's hinge turns at 10 rad/s where the trunk moves at 1 m/s
-        is_slide = self.model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
+        model = self.model
+        kind, place = model.jnt_type[model.dof_jntid], np.arange(model.nv) - model.jnt_dofadr[model.dof_jntid]
+        is_slide = (kind == _SLIDE) | ((kind == _FREE) & (place < 3))
         return np.where(is_slide, 1.0, 0.1)
+
+    @cached_property
+    def _others_x(self) -> Int[np.ndarray, " free"]:
+        """Where the x of bodies that float freely stands in qpos."""
+        return self.model.jnt_qposadr[self.model.jnt_type == _FREE]
+
+    @cached_property
+    def _quaternions(self) -> Int[np.ndarray, " quaternion"]:
+        """Where orientations begin in qpos."""
+        kind, first = self.model.jnt_type, self.model.jnt_qposadr
+        return np.concatenate([first[kind == _BALL], first[kind == _FREE] + 3])
 
     def pitch(self, qpos: Floats) -> Floats:
         """Pitch of the root body, in (-pi, pi] [rad]."""
@@ -217,103 +229,9 @@ class RobotSpec:
     @cached_property
     def _rest_z(self) -> float:
         # not zero where the slide joint has a `ref` (hopper, walker: 1.25)
-        return float(self.model.qpos0[self.root_addresses[1]])
-
-
-def _hold_to_plane(spec: mujoco.MjSpec, body_name: str, robot: str) -> None:
-    """Replace a body's free joint by slides along x and z and a hinge about y."""
-    body = spec.body(body_name)
-    free = [joint for joint in body.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE] if body else []
-    if not free:
-        raise RebodyError(f"robot '{robot}': its model has no body '{body_name}' that floats freely (a free joint).")
-    spec.delete(free[0])
-    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
-    axes = ((slide, [1, 0, 0]), (slide, [0, 0, 1]), (hinge, [0, 1, 0]))
-    for name, (kind, axis) in zip(PLANE_JOINTS, axes, strict=True):
-        joint = body.add_joint(name=name, type=kind, axis=axis, limited=False, armature=0)
-        joint.damping[:], joint.stiffness[:], joint.frictionloss = 0, 0, 0  # whatever the model's defaults say
-    for key in list(spec.keys):  # they have a number more than the joints now
-        spec.delete(key)
+        return float(self.rest_qpos[self.root_addresses[1]])
 
 
 def wrap_angle(angle: Floats) -> Floats:
     """An angle in (-pi, pi] [rad]."""
     return np.asarray(-((np.pi - angle) % (2 * np.pi) - np.pi), angle.dtype)
-
-
-class RobotBatch:
-    """Many copies of one robot, stepped together; bit-identical for any number of threads."""
-
-    def __init__(self, spec: RobotSpec, size: int, threads: int = 0):
-        """`threads` = 0 uses every processor."""
-        self.spec = spec
-        self.size = size
-        self._batch = mujoco.batch.Batch(spec.model, size, threads)
-        self.qpos: Float[np.ndarray, "robot nq"] = self._batch.bind("qpos")
-        self.qvel: Float[np.ndarray, "robot nv"] = self._batch.bind("qvel")
-        self._ctrl = self._batch.bind("ctrl")
-        self.lying_s: Float[np.ndarray, " robot"] = np.zeros(size)
-        """Seconds that each robot has lain on the ground without a break."""
-        self.pace: Float[np.ndarray, " robot"] = np.zeros(size)
-        """Mean speed of each robot over the last moments [m/s], see `RobotSpec.smoothing_s`."""
-
-    @property
-    def x(self) -> Float[np.ndarray, " robot"]:
-        """A copy of where each robot is [m]."""
-        return self.qpos[:, self.spec.root_addresses[0]].copy()
-
-    @property
-    def fallen(self) -> Bool[np.ndarray, " robot"]:
-        """Which robots have lain long enough to count as fallen."""
-        return (self.lying_s > 0) & (self.lying_s >= self.spec.fall.lasts_s)
-
-    def reset(self, rng: np.random.Generator, robots: Bool[np.ndarray, " robot"] | None = None) -> None:
-        """Put the chosen robots (default: all) at x = 0 in the rest pose, with Gymnasium's reset noise."""
-        ids = np.arange(self.size) if robots is None else np.flatnonzero(robots)
-        if ids.size == 0:
-            return
-        self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
-        model, noise = self.spec.model, self.spec.reset_noise
-        qpos = model.qpos0 + rng.uniform(-noise, noise, (ids.size, model.nq))
-        qpos[:, self.spec.root_addresses[0]] = 0.0
-        self.qpos[ids] = qpos
-        self.qvel[ids] = noise * rng.standard_normal((ids.size, model.nv))
-        self.lying_s[ids] = 0.0
-        self.pace[ids] = 0.0
-
-    def step(self, actions: Float[np.ndarray, "robot nu"]) -> None:
-        """One control step with joint actions in [-1, 1]; RebodyError if a simulation diverged."""
-        before, (low, high) = self.x, self.spec.model.actuator_ctrlrange.T
-        # centre and half-width, so that an action in a range of [-1, 1] arrives without rounding
-        self._ctrl[:] = 0.5 * (low + high) + 0.5 * (high - low) * np.clip(actions, -1.0, 1.0)
-        self._batch.step(nstep=self.spec.frame_skip)
-        if self._batch.warning[:, _DIVERGED, 1].any():
-            raise RebodyError(
-                f"the simulation of '{self.spec.name}' diverged; check that its actions are finite, "
-                "or lower the model's time step."
-            )
-        self.lying_s[:] = np.where(self.spec.lies(self.qpos), self.lying_s + self.spec.control_dt, 0.0)
-        self.pace[:] = self.spec.next_pace(self.pace, self.x - before)
-
-    def push(self, change: Float[np.ndarray, " robot"]) -> None:
-        """Change the speed of each robot's every part along x [m/s]."""
-        self.qvel[:, self.spec.x_velocity_address] += change
-
-    def joint_state(self) -> Float[np.ndarray, "robot joint"]:
-        """Joint state of each robot."""
-        return self.spec.joint_state(self.qpos, self.qvel)
-
-    def tracker_state(self) -> Float[np.ndarray, "robot joint"]:
-        """What a tracker sees of each robot."""
-        return self.spec.tracker_state(self.qpos, self.qvel, self.pace)
-
-    @property
-    def state(self) -> Float[np.ndarray, "robot state"]:
-        """A copy of all that stepping continues from bit-exactly: mjSTATE_INTEGRATION, `lying_s` and `pace`."""
-        return np.column_stack([self._batch.state, self.lying_s, self.pace])
-
-    @state.setter
-    def state(self, value: Float[np.ndarray, "robot state"]) -> None:
-        self._batch.state[:] = value[:, :-2]
-        self.lying_s[:], self.pace[:] = value[:, -2:].T
-        self._batch.warning[:] = 0

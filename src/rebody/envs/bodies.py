@@ -22,6 +22,8 @@ class Bodies(ABC):
     size: int
     actions: int
     """Numbers in the action of one body, each in [-1, 1]."""
+    root: int
+    """Id in the model of the body that a camera follows."""
 
     @property
     @abstractmethod
@@ -54,7 +56,7 @@ class Bodies(ABC):
 class PointMasses(Bodies):
     """Nominal mass-dampers, at rest after a reset. A step is a decision of 0.1 s."""
 
-    actions = 1
+    actions, root = 1, 1
 
     def __init__(self, size: int):
         self.size = size
@@ -106,7 +108,7 @@ class Robots(Bodies):
     def __init__(self, spec: RobotSpec, size: int, threads: int = 0):
         """`threads` = 0 uses every processor."""
         self.size = size
-        self.actions = spec.model.nu
+        self.actions, self.root = spec.model.nu, spec.root_body
         self._spec, self._threads = spec, threads
         self._batch = RobotBatch(spec, size, threads)
         self._past_qpos = np.zeros((spec.steps_per_decision + 1, size, spec.model.nq))

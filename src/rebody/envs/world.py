@@ -88,7 +88,7 @@ class World:
 
     def pictures(self) -> tuple[np.ndarray, ...]:
         """Every body, each [height, width, 3] of uint8."""
-        self._camera = self._camera or Camera(self.bodies.model)
+        self._camera = self._camera or Camera(self.bodies.model, root=self.bodies.root)
         return tuple(self._camera.picture(qpos) for qpos in self.bodies.qpos)
 
     def close(self) -> None:

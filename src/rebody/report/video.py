@@ -95,7 +95,7 @@ def _ffmpeg(path: Path) -> Iterator[Callable[[np.ndarray | None], None]]:
 def _frames(spec: RobotSpec, poses: list[Float[np.ndarray, " nq"]], episode: EpisodeResult):
     """Share done and picture of each frame."""
     every = max(1, round(1 / (FRAMES_PER_S * spec.control_dt)))
-    camera = Camera(spec.model, WIDTH, HEIGHT)
+    camera = Camera(spec.model, WIDTH, HEIGHT, spec.root_body)
     try:
         plot = None
         for step in range(0, len(poses), every):

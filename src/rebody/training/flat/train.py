@@ -14,6 +14,7 @@ from jaxtyping import Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import Inference, load_flat, load_inference
 from rebody.bodies import RobotBatch, load_robot
+from rebody.bodies.check import require_ready
 from rebody.control import sac
 from rebody.control.flat import FlatPolicy, FlatView
 from rebody.control.sac import Actor, SACBatch, SACState
@@ -56,10 +57,12 @@ def train_flat(
 ) -> Path:
     """Train a flat policy; returns the artifact's folder.
 
-    RebodyError if `out` holds another run, or module and robot do not fit; Interrupted on Ctrl-C.
+    RebodyError if the robot is not ready, `out` holds another run, or module and robot do not fit; Interrupted on
+    Ctrl-C.
     """
     check_ranges(config)
     spec, module = load_robot(robot), load_inference(inference)
+    require_ready(spec)
     if config.steps < spec.steps_per_decision:
         raise RebodyError(f"--steps must be at least the {spec.steps_per_decision} control steps of a decision.")
     module.contract.check_body(spec.name, spec.moving_fields, slots_of(spec.reach))

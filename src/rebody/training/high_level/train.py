@@ -17,6 +17,7 @@ from rebody.agents.controller import TrackerController
 from rebody.agents.parts import Inference, LoadedTracker, load_high_level, load_inference, load_tracker
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, RobotSpec, load_robot
+from rebody.bodies.check import require_ready
 from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.slot_policy import SlotPolicy, Slots, draw, judge, slot_sac, slots_within, subgoal_of
@@ -67,10 +68,12 @@ def train_high_level(
 ) -> Path:
     """Train a high-level policy for a tracker, by default `tracker-ROBOT`; returns the artifact's folder.
 
-    RebodyError if `out` holds another run, or module, tracker and robot do not fit; Interrupted on Ctrl-C.
+    RebodyError if the robot is not ready, `out` holds another run, or module, tracker and robot do not fit; Interrupted
+    on Ctrl-C.
     """
     check_ranges(config)
     spec, module = load_robot(robot), load_inference(inference)
+    require_ready(spec)
     loaded = load_tracker(tracker or f"tracker-{spec.name}")
     check_robot_of(loaded, spec)
     module.contract.check_body(spec.name, spec.moving_fields, loaded.tracker.slots)

@@ -17,6 +17,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import ScratchParts, load_scratch
 from rebody.bodies import RobotBatch, load_robot
+from rebody.bodies.check import require_ready
 from rebody.control import sac
 from rebody.control.flat import FlatPolicy, FlatView
 from rebody.control.high_level import told_code
@@ -83,10 +84,12 @@ def train_scratch(
 ) -> Path:
     """Train module and policy; returns the artifact's folder.
 
-    RebodyError if `out` holds another run, or `init_from` has other sizes; Interrupted on Ctrl-C.
+    RebodyError if the robot is not ready, `out` holds another run, or `init_from` has other sizes; Interrupted on
+    Ctrl-C.
     """
     check_ranges(config)
     spec = load_robot(robot)
+    require_ready(spec)
     with Run(
         out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume, finish=finish
     ) as run:

@@ -15,6 +15,7 @@ from jaxtyping import Float, Int, PRNGKeyArray
 from rebody.agents.build import check_robot_of
 from rebody.agents.parts import LoadedTracker, load_step_predictor, load_tracker
 from rebody.bodies import RobotBatch, load_robot
+from rebody.bodies.check import require_ready
 from rebody.control import sac
 from rebody.control.sac import SACBatch, SACState
 from rebody.control.step_predictor import MOST_STEPS, StepPredictor, steps_of
@@ -56,12 +57,14 @@ def train_step_predictor(
 ) -> Path:
     """Train a step predictor for a tracker, by default `tracker-ROBOT`; returns the artifact's folder.
 
-    RebodyError if `out` holds another run, or robot, tracker and `init_from` do not fit; Interrupted on Ctrl-C.
+    RebodyError if the robot is not ready, `out` holds another run, or robot, tracker and `init_from` do not fit;
+    Interrupted on Ctrl-C.
     """
     check_ranges(config)
     if config.steps < MOST_STEPS:
         raise RebodyError(f"--steps must be at least {MOST_STEPS}: so long can a subgoal be held.")
     spec = load_robot(robot)
+    require_ready(spec)
     loaded = load_tracker(tracker or f"tracker-{spec.name}")
     check_robot_of(loaded, spec)
     settings = {"robot": robot, "tracker": tracker, "seed": seed, "init_from": init_from}

@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import load_tracker
 from rebody.bodies import RobotBatch, load_robot
+from rebody.bodies.check import require_ready
 from rebody.control import sac
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.tracker import Command, Motion, Tracker, after, slots_of, tracker_observation, tracker_reward
@@ -66,11 +67,12 @@ def train_tracker(
 ) -> Path:
     """Train a tracker; returns the artifact's folder.
 
-    RebodyError if `out` holds another run, `init_from` has other sizes, or the robot has no such slot as the only one
-    asked for; Interrupted on Ctrl-C.
+    RebodyError if the robot is not ready, `out` holds another run, `init_from` has other sizes, or the robot has no
+    such slot as the only one asked for; Interrupted on Ctrl-C.
     """
     check_ranges(config)
     spec = load_robot(robot)
+    require_ready(spec)
     only, slots = config.commands.only, slots_of(config.reach)
     if only not in (None, *slots):
         raise RebodyError(f"'{spec.name}' is not trained for slot '{only}'; it has: {', '.join(slots)}.")
