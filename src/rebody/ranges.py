@@ -5,6 +5,7 @@ it. Upper ends are far beyond what makes sense: they keep slips of the finger fr
 """
 
 import math
+import sys
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from types import UnionType
@@ -107,9 +108,10 @@ def _alternatives(annotation: Any) -> Iterator[tuple[Any, list[Meta]]]:
         yield bare, limits
 
 
-def _most(annotation: Any) -> float:
+def _most(annotation: Any) -> int:
     """How many numbers there may be."""
-    return min((e.max_length for e in _extras(annotation) if getattr(e, "max_length", None)), default=math.inf)
+    limits = [extra.max_length for extra in _extras(annotation) if isinstance(extra, Meta) and extra.max_length]
+    return min(limits, default=sys.maxsize)
 
 
 def _extras(annotation: Any) -> tuple[Any, ...]:

@@ -6,7 +6,7 @@ nothing is built from may be missing. `training` holds the settings of the run: 
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any
 
 from msgspec import Meta
 
@@ -46,20 +46,6 @@ def understood(value: Any, kind: type[Typed], name: str) -> Typed:
             f"the settings of artifact '{name}' are not understood ({misfit}): another release of rebody made it, or "
             "it was edited. Install that release, or train the artifact again."
         ) from misfit
-
-
-class ActorSizes(Protocol):
-    """Of any policy."""
-
-    @property
-    def hidden(self) -> tuple[int, ...]:
-        """Units of each hidden layer."""
-        ...
-
-    @property
-    def projections(self) -> int:
-        """See `SACConfig`."""
-        ...
 
 
 @dataclass(frozen=True)

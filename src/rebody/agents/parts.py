@@ -11,7 +11,6 @@ from jaxtyping import Int
 
 from rebody.agents.belief import LiveBelief
 from rebody.agents.configs import (
-    ActorSizes,
     ClassifierSettings,
     FlatSettings,
     HighLevelSettings,
@@ -174,19 +173,21 @@ def inference_template(settings: InferenceSettings) -> InferenceParts:
 
 def tracker_template(settings: TrackerSettings) -> Tracker:
     """A tracker of the right shapes, to be filled with weights."""
-    return Tracker(_actor_template(settings.observations, settings.actions, settings), settings.reach)
+    return Tracker(
+        _actor_template(settings.observations, settings.actions, settings.hidden, settings.projections), settings.reach
+    )
 
 
 def flat_template(settings: FlatSettings) -> FlatPolicy:
     """A flat policy of the right shapes, to be filled with weights."""
-    actor = _actor_template(settings.observations, settings.actions, settings)
+    actor = _actor_template(settings.observations, settings.actions, settings.hidden, settings.projections)
     return FlatPolicy(actor, FlatView(settings.places, settings.reach))
 
 
 def scratch_template(settings: ScratchSettings) -> ScratchParts:
     """Parts of the right shapes, to be filled with weights."""
     module = settings.inference
-    actor = _actor_template(settings.observations, settings.actions, settings)
+    actor = _actor_template(settings.observations, settings.actions, settings.hidden, settings.projections)
     return ScratchParts(
         module=InferenceModule(module, settings.actions, jax.random.key(0)),
         policy=FlatPolicy(actor, FlatView(module.places)),
@@ -197,12 +198,16 @@ def scratch_template(settings: ScratchSettings) -> ScratchParts:
 def slot_policy_template(settings: HighLevelSettings) -> SlotPolicy:
     """A high-level policy of a robot of the right shapes, to be filled with weights."""
     slots = tuple((family_index(name), scale) for name, scale in settings.slots.items())
-    return SlotPolicy(_actor_template(settings.observations, len(slots), settings), settings.view, slots)
+    return SlotPolicy(
+        _actor_template(settings.observations, len(slots), settings.hidden, settings.projections), settings.view, slots
+    )
 
 
 def step_predictor_template(settings: StepPredictorSettings) -> StepPredictor:
     """A step predictor of the right shapes, to be filled with weights."""
-    return StepPredictor(_actor_template(settings.observations, 1, settings), settings.reach)
+    return StepPredictor(
+        _actor_template(settings.observations, 1, settings.hidden, settings.projections), settings.reach
+    )
 
 
 def slots_template(settings: ClassifierSettings) -> SlotParts:
@@ -295,7 +300,7 @@ def _check_indices(name: str, array: str, found: Int[AnyArray, " index"], famili
 
 
 def _policy_template(view: PolicyView, believed: int, actions: int, sizes: ToyPolicySettings) -> HighLevelPolicy:
-    return HighLevelPolicy(_actor_template(view.size(believed), actions, sizes), view)
+    return HighLevelPolicy(_actor_template(view.size(believed), actions, sizes.hidden, sizes.projections), view)
 
 
 def _probe_template(latent: int, families: int) -> Probe:
@@ -303,6 +308,5 @@ def _probe_template(latent: int, families: int) -> Probe:
     return Probe(np.zeros(families, np.int32), weights, weights)
 
 
-def _actor_template(observations: int, actions: int, sizes: ActorSizes) -> Actor:
-    config = SACConfig(hidden=sizes.hidden, projections=sizes.projections)
-    return Actor(observations, actions, config, jax.random.key(0))
+def _actor_template(observations: int, actions: int, hidden: tuple[int, ...], projections: int) -> Actor:
+    return Actor(observations, actions, SACConfig(hidden=hidden, projections=projections), jax.random.key(0))

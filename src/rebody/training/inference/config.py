@@ -78,11 +78,16 @@ class MetaConfig:
             ("--inference.scales", self.inference.fields, self.inference.scales),
         )
         for option, fields, scales in pairs:
+            if len(set(fields)) < len(fields):
+                raise RebodyError(f"{option} go with fields of which one comes twice: {', '.join(fields)}.")
             if len(fields) != len(scales):
                 raise RebodyError(
                     f"{option} must give a number for each of {', '.join(fields)}: {len(fields)}, not {len(scales)}."
                 )
 
+        for task in self.tasks.base_tasks:
+            if task.low > task.high or task.low == task.high == 0:
+                raise RebodyError(f"a base task of {task.family} cannot have targets from {task.low} to {task.high}.")
         if (self.inference.window or 1) > self.decisions:
             raise RebodyError(
                 f"--inference.window {self.inference.window} is longer than --decisions {self.decisions}."
