@@ -1,4 +1,4 @@
-"""Malformed task files, logs and command lines: one message for each, never a traceback, a hang or gigabytes.
+"""Malformed task files, logs, artifacts, command lines: one message for each, never a traceback, hang or gigabytes.
 
     .venv/bin/python benchmarks/faults.py [--inputs 5000] [--seed 0]
 
@@ -161,7 +161,7 @@ def show(outcomes: Counter[tuple[str, str]], console: Console) -> None:
 def draw(rng: np.random.Generator, folder: Path, inputs: int) -> Iterator[Case]:
     """So many cases, whose files lie in the folder for as long as they are needed."""
     make_odd_files(folder)
-    kinds: tuple[Callable[[np.random.Generator, Path], Case], ...] = (task_file, log, command_line)
+    kinds: tuple[Callable[[np.random.Generator, Path], Case], ...] = (task_file, log, artifact, command_line)
     for _ in range(inputs):
         yield kinds[rng.integers(len(kinds))](rng, folder)
 
@@ -302,6 +302,93 @@ def spoilt_rows(rng: np.random.Generator, rows: list[str]) -> tuple[list[str], b
             factor = pick(rng, (100.0, -1.0, 0.0))
             scaled = [f"{row.rsplit(',', 1)[0]},{factor * float(row.rsplit(',', 1)[1])}" for row in rows[1:]]
             return [rows[0], *scaled], False
+
+
+# artifacts
+
+ARTIFACTS = (
+    (["--robot", "point-mass", "--inference"], "inference", "goal-velocity-stand"),
+    (["--robot", "cheetah", "--inference", "position", "--tracker"], "tracker", "tracker-cheetah"),
+    (["--robot", "cheetah", "--inference", "position", "--agent", "flat", "--flat"], "flat", "flat-position-cheetah"),
+    (["--robot", "cheetah", "--agent", "scratch", "--scratch"], "scratch", "scratch-cheetah"),
+    (
+        ["--robot", "cheetah", "--inference", "goal-velocity", "--classifier"],
+        "classifier",
+        "classifier-goal-velocity",
+    ),
+    (
+        ["--robot", "cheetah", "--inference", "goal-velocity", "--agent", "retrain", "--high-level"],
+        "high-level",
+        "high-level-goal-velocity-cheetah",
+    ),
+    (
+        ["--robot", "cheetah", "--inference", "position", "--thesis", "--stride", "predicted", "--step-predictor"],
+        "step-predictor",
+        "step-predictor-cheetah",
+    ),
+)
+"""What loads each kind, and an artifact of it."""
+
+
+def artifact(rng: np.random.Generator, folder: Path) -> Case:
+    """A shipped artifact with one thing changed, and hashes that fit."""
+    from rebody.store import artifact as store
+
+    words, kind, name = pick(rng, ARTIFACTS)
+    content = {each: (store.SHIPPED / name / each).read_bytes() for each in store.HASHED}
+    is_wrong = spoil_artifact(rng, content)
+    manifest = store._manifest(kind, content)
+    if rng.random() < 0.1:
+        manifest, is_wrong = spoilt_json(rng, json.loads(manifest)), False
+    (folder / "odd").mkdir(exist_ok=True)
+    for each, data in (content | {store.MANIFEST: manifest}).items():
+        (folder / "odd" / each).write_bytes(data)
+    return Case("artifact", ["evaluate", "--tasks", "good.json", "--seconds", "5", *words, "./odd"], is_wrong)
+
+
+def spoil_artifact(rng: np.random.Generator, content: dict[str, bytes]) -> bool:
+    """Changes settings or weights in place; whether that is sure to be wrong."""
+    import safetensors.numpy
+
+    if rng.random() < 0.6:
+        settings = json.loads(content["config.json"])
+        training = {"training": settings.pop("training")} if rng.random() < 0.8 else {}
+        content["config.json"] = spoilt_json(rng, settings, training)
+        return False
+    arrays = safetensors.numpy.load(content["weights.safetensors"])
+    name = pick(rng, sorted(arrays))
+    match rng.integers(4):
+        case 0:
+            arrays[name] = np.full_like(arrays[name], np.nan if arrays[name].dtype.kind == "f" else 99)
+            is_wrong = arrays[name].dtype.kind != "b"
+        case 1:
+            arrays[name], is_wrong = arrays[name][..., None], True
+        case 2:
+            arrays.pop(name)
+            is_wrong = True
+        case _:
+            data = bytearray(content["weights.safetensors"])
+            data[rng.integers(200)] ^= 1 << int(rng.integers(8))
+            content["weights.safetensors"] = bytes(data)
+            return False
+    content["weights.safetensors"] = safetensors.numpy.save(arrays)
+    return is_wrong
+
+
+def spoilt_json(rng: np.random.Generator, settings: dict, more: dict | None = None) -> bytes:
+    """An object with another value, a key more or a key less somewhere."""
+    inner, name = settings, pick(rng, list(settings))
+    while isinstance(inner[name], dict | list) and inner[name] and rng.random() < 0.7:
+        inner = inner[name]
+        name = pick(rng, list(inner) if isinstance(inner, dict) else range(len(inner)))
+    match rng.integers(4):
+        case 0:
+            del inner[name]
+        case 1 if isinstance(inner, dict):
+            inner[f"{name}_"] = inner[name]
+        case _:
+            inner[name] = pick(rng, BAD_VALUES)
+    return json.dumps(settings | (more or {})).encode()
 
 
 # command lines

@@ -30,6 +30,8 @@ Hash = Annotated[str, Meta(max_length=64)]
 """SHA-256 in hex, of the weights of another artifact."""
 FamilyIndex = Annotated[int, Meta(ge=0, lt=len(FAMILIES))]
 """Into `rebody.tasks.FAMILIES`."""
+SMALLEST = 1e-6
+"""What is divided by a smaller scale may overflow."""
 LARGEST_MIXTURE = 10_000_000
 """Numbers of all covariances of a mixture."""
 
@@ -210,6 +212,7 @@ def _check_module(contract: Contract, inference: InferenceConfig) -> None:
     if contract.version != CONTRACT_VERSION:
         raise ValueError(f"contract: it has version {contract.version}, this release reads {CONTRACT_VERSION}")
     _check_fields("inference.", inference.fields, inference.scales)
+    _check_divisors("inference.reward_scale", [inference.reward_scale])
     if contract.fields != inference.fields:
         raise ValueError(f"contract.fields: {', '.join(contract.fields)}, but the encoder sees {inference.fields}")
     if contract.window != inference.window:
@@ -227,11 +230,18 @@ def _check_fields(where: str, names: Sequence[str], scales: Sequence[float]) -> 
     _check_known(f"{where}fields", names, GLOBAL_FIELDS)
     if len(scales) != len(names):
         raise ValueError(f"{where}scales: {len(scales)} numbers for {len(names)} fields")
+    _check_divisors(f"{where}scales", scales)
 
 
 def _check_places(key: str, places: Places) -> None:
     if places:
         _check_known(key, [name for name, _ in places], GLOBAL_FIELDS)
+        _check_divisors(key, [unit for _, unit in places])
+
+
+def _check_divisors(key: str, numbers: Sequence[float]) -> None:
+    if min(numbers) < SMALLEST:
+        raise ValueError(f"{key}: {min(numbers)} is too small to divide by")
 
 
 def _check_families(key: str, names: Iterable[str]) -> None:
