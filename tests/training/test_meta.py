@@ -39,11 +39,9 @@ def test_a_sound_checkpoint_is_resumed(meta, tmp_path):
 @pytest.mark.parametrize(
     ("meta", "says"),
     [
-        (None, "Expected `object`, got `null`"),
-        ([], "got `array`"),
         ({}, "missing required field `settings`"),
         (SOUND | {"settings": None}, "settings: Expected"),
-        (SOUND | {"settings": {"rate": 0.1}}, "settings.*iterations|settings"),
+        (SOUND | {"settings": {"rate": 0.1}}, r"settings\.iterations"),
         (SOUND | {"settings": SETTINGS | {"iterations": "5"}}, "settings"),
         (SOUND | {"settings": SETTINGS | {"iterations": -5}}, "settings"),
         (SOUND | {"wall_s": float("nan")}, "wall_s"),
@@ -62,5 +60,5 @@ def test_a_foreign_one_is_refused_by_its_key(meta, says, tmp_path):
 
 
 def test_one_whose_state_is_not_finite_is_refused(tmp_path):
-    with pytest.raises(RebodyError, match="is not understood .* not finite"):
+    with pytest.raises(RebodyError, match=r"is not understood \(.* not finite"):
         resumed(tmp_path, SOUND, state(np.nan))

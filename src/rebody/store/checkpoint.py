@@ -95,8 +95,8 @@ def _read_checked(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         )
     meta_json = header.get("meta", "")
     try:
-        if header.get("sha256") == _sha256(arrays, meta_json):
-            return arrays, json.loads(meta_json)
+        if header.get("sha256") == _sha256(arrays, meta_json) and isinstance(meta := json.loads(meta_json), dict):
+            return arrays, meta
     except (ValueError, RecursionError, TypeError) as error:  # the last for types that are never stored
         raise _damaged(path) from error
     raise _damaged(path)

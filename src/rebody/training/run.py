@@ -21,7 +21,7 @@ from jaxtyping import Float
 from msgspec import Meta
 
 from rebody.errors import RebodyError
-from rebody.ranges import Number, check_seed
+from rebody.ranges import check_seed
 from rebody.store import holds_checkpoint, load_checkpoint, recover, save_checkpoint, take_folder, tree_to_arrays
 from rebody.store.artifact import MANIFEST
 from rebody.store.checkpoint import FOLDER
@@ -140,9 +140,12 @@ class Run:
     def _understood(self, said: Any) -> RunMeta:
         try:
             meta = typed(said, RunMeta)
-            typed({name: meta.settings.get(name) for name in self._length}, dict[str, Number], "settings")
         except Misfit as misfit:
             raise self._foreign(str(misfit)) from misfit
+        for name in self._length:
+            turns = meta.settings.get(name)
+            if type(turns) is not int or turns < 0:
+                raise self._foreign(f"settings.{name}: a number of iterations is needed")
         return meta
 
     def _foreign(self, what: str) -> RebodyError:
