@@ -32,8 +32,6 @@ FamilyIndex = Annotated[int, Meta(ge=0, lt=len(FAMILIES))]
 """Into `rebody.tasks.FAMILIES`."""
 SMALLEST = 1e-6
 """What is divided by a smaller scale may overflow."""
-LARGEST_MIXTURE = 10_000_000
-"""Numbers of all covariances of a mixture."""
 
 
 def understood(value: Any, kind: type[Typed], name: str) -> Typed:
@@ -78,7 +76,7 @@ class InferenceSettings:
         """ValueError for what cannot be built."""
         _check_module(self.contract, self.inference)
         _check_fields("high_level.", self.high_level.fields, self.high_level.scales)
-        if self.mixture and self.mixture.maximum * self.inference.clustered**2 > LARGEST_MIXTURE:
+        if self.mixture and not self.mixture.fits(self.inference.clustered):
             raise ValueError(f"mixture.maximum: {self.mixture.maximum} is too much for such a latent")
         self.make_toy()
 

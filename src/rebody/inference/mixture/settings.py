@@ -5,6 +5,9 @@ from typing import Literal
 
 from rebody.ranges import Copies, Count, Number, Positive
 
+LARGEST = 10_000_000
+"""Numbers in all covariances together."""
+
 
 @dataclass(frozen=True)
 class MixtureConfig:
@@ -26,3 +29,7 @@ class MixtureConfig:
     """First iteration with a fit; before it the prior is N(0, I)."""
     maximum: Copies = 32
     """Components that the loss can take."""
+
+    def fits(self, dimensions: int) -> bool:
+        """Whether the covariances of so many dimensions can be held."""
+        return self.maximum * dimensions**2 <= LARGEST

@@ -85,6 +85,10 @@ class MetaConfig:
                     f"{option} must give a number for each of {', '.join(fields)}: {len(fields)}, not {len(scales)}."
                 )
 
+        if self.prior == "mixture" and not self.mixture.fits(self.inference.clustered):
+            raise RebodyError(
+                f"--mixture.maximum {self.mixture.maximum} is too much for a latent of {self.inference.latent}."
+            )
         for task in self.tasks.base_tasks:
             if task.low > task.high or task.low == task.high == 0:
                 raise RebodyError(f"a base task of {task.family} cannot have targets from {task.low} to {task.high}.")
