@@ -24,8 +24,8 @@ from rebody.tasks import FAMILIES
 from rebody.tasks.families import family_names
 from rebody.types import GLOBAL_FIELDS
 
-Name = Annotated[str, Meta(min_length=1, max_length=255)]
-"""Of a robot or an artifact."""
+Name = Annotated[str, Meta(max_length=255, pattern=r"^[^\x00-\x1f\x7f]+$")]
+"""Of a robot or an artifact: nothing that a terminal would obey."""
 Hash = Annotated[str, Meta(max_length=64)]
 """SHA-256 in hex, of the weights of another artifact."""
 FamilyIndex = Annotated[int, Meta(ge=0, lt=len(FAMILIES))]

@@ -33,6 +33,8 @@ def typed(value: Any, kind: type[Typed], key: str = "") -> Typed:
         raise Misfit(_said(_within(key, inner), what)) from error
     except RecursionError as error:
         raise Misfit(_said(key, "it is nested too deeply")) from error
+    except UnicodeEncodeError as error:  # JSON may hold half of a surrogate pair
+        raise Misfit(_said(key, "it holds what is no text")) from error
     return found
 
 
@@ -56,5 +58,6 @@ def _within(key: str, inner: str) -> str:
 
 
 def _said(key: str, what: str) -> str:
-    text = f"{key}: {what}" if key else what
+    """In one line, without what a terminal would obey."""
+    text = "".join(sign if sign.isprintable() else "?" for sign in (f"{key}: {what}" if key else what))
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
