@@ -6,6 +6,7 @@ Then what many tests share: tiny parts, most of them untrained, and command line
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 
 cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "rebody" / "jax-tests"
@@ -22,6 +23,7 @@ import jax  # noqa: E402
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
 
+from rebody.agents.configs import InferenceSettings  # noqa: E402
 from rebody.agents.parts import Inference, LoadedFlat, LoadedTracker, inference_template  # noqa: E402
 from rebody.bodies import load_robot  # noqa: E402
 from rebody.bodies.robot import Reach  # noqa: E402
@@ -35,6 +37,7 @@ from rebody.evaluation.evaluate import Trial  # noqa: E402
 from rebody.inference.contract import Contract  # noqa: E402
 from rebody.inference.probe import Probe  # noqa: E402
 from rebody.store import tree_hash  # noqa: E402
+from rebody.store.typed import typed  # noqa: E402
 from rebody.training.flat import report as flat_report  # noqa: E402
 from rebody.training.high_level import report as high_level_report  # noqa: E402
 from rebody.training.inference import measure as inference_measure  # noqa: E402
@@ -54,7 +57,7 @@ JOINTS, ACTIONS = 17, 6  # of a cheetah
 def stored_config():
     """What an inference artifact's config.json says of its parts."""
     return {
-        "contract": Contract(("x",), WINDOW, {"goal": (-10.0, 10.0)}, "plain").to_config(),
+        "contract": asdict(Contract(("x",), WINDOW, {"goal": (-10.0, 10.0)}, "plain")),
         "inference": {"units": 8, "window": WINDOW, "latent": 2},
         "high_level": {"fields": ["x", "vx"], "scales": [10.0, 3.5], "hidden": [8], "projections": 0},
         "toy": {"kind": "mass-damper", "mass": 1.0, "damping": 2.0, "max_force": 7.0},
@@ -63,7 +66,8 @@ def stored_config():
 
 @pytest.fixture(scope="session")
 def inference(stored_config):
-    parts = eqx.filter_jit(lambda: inference_template(stored_config))()
+    settings = typed(stored_config, InferenceSettings)
+    parts = eqx.filter_jit(lambda: inference_template(settings))()
     weights = [parts.high_level.actor.net.mlp.weights[-1], parts.told_policy.actor.net.mlp.weights[-1]]
     probe = Probe(np.zeros(1, np.int32), np.zeros((3, 1), np.float32), np.array([[2.0], [-1.0], [0.5]], np.float32))
     parts = eqx.tree_at(
@@ -71,7 +75,7 @@ def inference(stored_config):
         parts,
         (*(30 * w for w in weights), probe),  # fresh policies hardly act; these do
     )
-    return Inference("tiny", Contract.from_config(stored_config["contract"]), parts, MassDamper())
+    return Inference("tiny", settings.contract, parts, MassDamper())
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ import pytest
 
 from rebody.bodies import load_robot
 from rebody.errors import RebodyError
-from rebody.ranges import Count, Share, _fields_of, _numbers, check_ranges
+from rebody.ranges import Count, Layers, Share, _fields_of, _numbers, check_ranges
 from rebody.training.classifier import ClassifierConfig
 from rebody.training.flat import FlatConfig
 from rebody.training.high_level import HighLevelConfig
@@ -68,6 +68,7 @@ def spoiling(settings, name, value):
 @dataclass(frozen=True)
 class Inner:
     widths: tuple[Count, ...] = (8, 8)
+    hidden: Layers = (8, 8)
     pair: tuple[Share, Share] | None = None
 
 
@@ -85,6 +86,7 @@ class Outer:
         (Outer(decay_rate=float("nan")), r"^--decay-rate must be a number, not nan\.$"),
         (Outer(length=0), r"^--length must be at least 1 and at most 1,000,000, not 0\.$"),
         (Outer(inner=Inner(widths=(8, 0))), r"^--inner\.widths must be at least 1"),
+        (Outer(inner=Inner(hidden=(1,) * 33)), r"^--inner\.hidden must be at most 32 numbers, not 33\.$"),
         (Outer(inner=Inner(pair=(0.5, 2.0))), r"^--inner\.pair must be"),
     ],
 )

@@ -5,6 +5,7 @@ it. Upper ends are far beyond what makes sense: they keep slips of the finger fr
 """
 
 import math
+import sys
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from types import UnionType
@@ -24,6 +25,8 @@ Number = Annotated[int, Meta(ge=0, le=1_000_000)]
 """The same, where 0 means none."""
 Copies = Annotated[int, Meta(ge=1, le=4096)]
 """Bodies that move in parallel, and units of a layer."""
+Layers = Annotated[tuple[Copies, ...], Meta(max_length=32)]
+"""Units of each hidden layer of a network."""
 Rows = Annotated[int, Meta(ge=1, le=5_000_000)]
 """Transitions that are kept in memory."""
 Share = Annotated[float, Meta(ge=0, le=1)]
@@ -51,6 +54,8 @@ Seed = Annotated[int, Meta(ge=0, lt=2**32)]
 def check_ranges(settings: Any) -> None:
     """RebodyError that names the first field, as an option, whose value lies outside of its range or is NaN."""
     for option, value, annotation in _fields_of(settings, ""):
+        if isinstance(value, tuple) and len(value) > (most := _most(annotation)):
+            raise RebodyError(f"{option} must be at most {most} numbers, not {len(value)}.")
         for number, limits in _numbers(value, annotation):
             if wanted := _wanted(number, limits):
                 raise RebodyError(f"{option} must be {wanted}, not {number!r}.")
@@ -101,6 +106,12 @@ def _alternatives(annotation: Any) -> Iterator[tuple[Any, list[Meta]]]:
                 yield inner, limits + of_inner
     else:
         yield bare, limits
+
+
+def _most(annotation: Any) -> int:
+    """How many numbers there may be."""
+    limits = [extra.max_length for extra in _extras(annotation) if isinstance(extra, Meta) and extra.max_length]
+    return min(limits, default=sys.maxsize)
 
 
 def _extras(annotation: Any) -> tuple[Any, ...]:

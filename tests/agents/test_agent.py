@@ -11,12 +11,13 @@ import pytest
 from rebody.agents.agent import Observation
 from rebody.agents.build import AGENTS, build_agent
 from rebody.agents.clock import begin, decide
+from rebody.agents.configs import InferenceSettings
 from rebody.agents.parts import Inference, inference_template
 from rebody.bodies.toys import FullToy
 from rebody.control.high_level import PolicyView
 from rebody.errors import RebodyError
-from rebody.inference.contract import Contract
 from rebody.inference.probe import fit_probe
+from rebody.store.typed import typed
 from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.types import Belief, GlobalState, Task, Transition
 
@@ -217,8 +218,9 @@ def test_reuse_of_several_families_acts_by_the_policy_on_the_point_mass(inferenc
 @pytest.fixture(scope="module")
 def standing(stored_config):
     """A module that learned to stand at a pitch, on the full toy."""
+    seen = {"fields": ("x", "pitch"), "window": None, "target_ranges": {"stand": (-1.5, 1.5)}}
     config = stored_config | {
-        "contract": stored_config["contract"] | {"fields": ("x", "pitch"), "target_ranges": {"stand": (-1.5, 1.5)}},
+        "contract": stored_config["contract"] | seen,
         "inference": {
             "units": 8,
             "window": None,
@@ -230,14 +232,15 @@ def standing(stored_config):
         "high_level": stored_config["high_level"] | {"fields": ["pitch", "pitch_rate"]},
         "toy": {"kind": "full", "max_torque": 6.0},
     }
-    parts = eqx.filter_jit(lambda: inference_template(config))()
+    settings = typed(config, InferenceSettings)
+    parts = eqx.filter_jit(lambda: inference_template(settings))()
     parts = eqx.tree_at(
         lambda p: [policy.actor.net.mlp.weights[-1] for policy in (p.high_level, p.told_policy)],
         parts,
         replace_fn=lambda w: 30 * w,
     )
     parts = eqx.tree_at(lambda p: p.probe.families, parts, jnp.array([STAND]))
-    return Inference("standing", Contract.from_config(config["contract"]), parts, FullToy(max_torque=6.0))
+    return Inference("standing", settings.contract, parts, FullToy(max_torque=6.0))
 
 
 @pytest.mark.parametrize("kind", ["reuse", "readout", "bayes", "oracle", "idle"])

@@ -7,11 +7,12 @@ import pytest
 
 import rebody
 from rebody.agents.build import build_agent
+from rebody.agents.configs import InferenceSettings
 from rebody.agents.parts import Inference, inference_template
 from rebody.agents.rollout import rollout_on_toy
 from rebody.bodies.toys import MassDamper
 from rebody.errors import RebodyError
-from rebody.inference.contract import Contract
+from rebody.store.typed import typed
 from rebody.tasks import GOAL
 from rebody.types import Task
 
@@ -24,8 +25,9 @@ def module_of(stored_config, *fields, **contract):
         "inference": stored_config["inference"] | {"fields": fields, "scales": (1.0,) * len(fields)},
         "contract": stored_config["contract"] | {"fields": fields} | contract,
     }
-    parts = eqx.filter_jit(lambda: inference_template(config))()
-    return Inference("untrained", Contract.from_config(config["contract"]), parts, MassDamper())
+    settings = typed(config, InferenceSettings)
+    parts = eqx.filter_jit(lambda: inference_template(settings))()
+    return Inference("untrained", settings.contract, parts, MassDamper())
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from rebody.agents.configs import InferenceSettings
 from rebody.agents.parts import inference_template, load_flat, load_inference, load_step_predictor, load_tracker
 from rebody.bodies.robot import Reach
 from rebody.bodies.toys import FullToy, MassDamper, PositionToy, describe_toy
 from rebody.control.flat import FlatView
 from rebody.errors import RebodyError
 from rebody.store import save_artifact, tree_hash, tree_to_arrays
+from rebody.store.typed import typed
 
 X = np.linspace(-3, 3, 5, dtype=np.float32)
 SLOTS = ("goal", "velocity")
@@ -125,7 +127,7 @@ def test_a_module_is_loaded_with_its_mixture(kinds, stored_config, tmp_path):
         "mixture": {"maximum": 4},
         "toy": describe_toy(FullToy(max_torque=3.0)),
     }
-    parts = eqx.filter_jit(lambda: inference_template(config))()
+    parts = eqx.filter_jit(lambda: inference_template(typed(config, InferenceSettings)))()
     active = np.arange(4) < 2
     parts = eqx.tree_at(
         lambda p: (p.mixture.active, p.mixture.mean),

@@ -159,7 +159,7 @@ def _rewrite(change: Callable[[dict], None]) -> Callable[[Path], None]:
         (_be_from_the_future, "99"),
         (_rewrite(lambda config: config["contract"].update(version=99)), "version 99"),
         (_rewrite(lambda config: config["contract"].update(decision_dt=0.05)), "every 0.05 s"),
-        (_rewrite(lambda config: config["contract"].update(fields=["x", "y"])), "sees y"),
+        (_rewrite(lambda config: config["contract"].update(fields=["x", "y"])), "contract.fields: x, y"),
         (_rewrite(lambda config: config["contract"].update(target_ranges={"jump": [1.5, 3.0]})), "jump"),
         (_rewrite(lambda config: config["inference"].update(units=32)), "position"),
         (_rewrite(lambda config: config["inference"].update(colour="red")), "not understood"),

@@ -19,9 +19,14 @@ def faults():
         yield module
 
 
-def test_nothing_malformed_ends_in_a_traceback_a_hang_or_gigabytes(faults, tmp_path):
+@pytest.fixture(scope="module")
+def malformed(faults):
+    return importlib.import_module("malformed")
+
+
+def test_nothing_malformed_ends_in_a_traceback_a_hang_or_gigabytes(faults, malformed, tmp_path):
     with faults.ready(tmp_path):
-        outcomes = [(case, faults.attempt(case)) for case in faults.draw(np.random.default_rng(7), tmp_path, INPUTS)]
+        outcomes = [(case, faults.attempt(case)) for case in malformed.draw(np.random.default_rng(7), tmp_path, INPUTS)]
     assert len(outcomes) == INPUTS
     bad = [(case, *outcome) for case, outcome in outcomes if outcome[0] not in ("refused", "accepted")]
     assert bad == []
@@ -29,14 +34,14 @@ def test_nothing_malformed_ends_in_a_traceback_a_hang_or_gigabytes(faults, tmp_p
     assert sum(outcome[0] == "accepted" for _, outcome in outcomes) > INPUTS // 20
 
 
-def test_a_fault_would_be_seen(faults, tmp_path, monkeypatch):
+def test_a_fault_would_be_seen(faults, malformed, tmp_path, monkeypatch):
     def break_down(*_):
         raise IndexError
 
     with faults.ready(tmp_path):
-        faults.make_odd_files(tmp_path)
+        malformed.make_odd_files(tmp_path)
         monkeypatch.setattr("rebody.cli.evaluate.read_tasks", break_down)
-        case = faults.Case("", ["evaluate", "--tasks", "good.json", *faults.ON_TOY], is_wrong=True)
+        case = malformed.Case("", ["evaluate", "--tasks", "good.json", *malformed.ON_TOY], is_wrong=True)
         assert faults.attempt(case)[0] == "traceback"
         monkeypatch.undo()
         assert faults.attempt(case)[0] == "accepted, though wrong"

@@ -2,22 +2,23 @@
 
 import importlib
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import equinox as eqx
 import numpy as np
 import pytest
 
 from rebody.agents.build import AGENTS, check_step_predictor
+from rebody.agents.configs import InferenceSettings
 from rebody.agents.parts import LoadedStepPredictor, inference_template
 from rebody.bodies import load_robot
 from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results
 from rebody.evaluation.evaluate import POINT_MASS, ROBOT_AGENTS, run_trial, take_yardsticks, trial_agent
-from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import no_mixture
 from rebody.store import tree_hash
+from rebody.store.typed import typed
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 
 SPECS = [TaskSpec("goal", 2.0), TaskSpec("goal", 1.0, Switch(1.2, "goal", -3.0))]
@@ -190,13 +191,14 @@ def test_who_has_no_latent_that_a_mixture_knows_has_one_cluster(trial, with_mixt
 def test_a_module_of_several_families_is_for_the_point_mass_and_for_readout(trial):
     ranges = {"goal": (-10.0, 10.0), "velocity": (-3.0, 3.0)}
     config = {
-        "contract": replace(trial.inference.contract, target_ranges=ranges).to_config(),
+        "contract": asdict(replace(trial.inference.contract, target_ranges=ranges)),
         "inference": {"units": 8, "window": 6, "latent": 2},
         "high_level": {"fields": ["x", "vx"], "scales": [10.0, 3.5], "hidden": [8], "projections": 0},
         "toy": {"kind": "mass-damper"},
     }
-    parts = eqx.filter_jit(lambda: inference_template(config))()
-    several = replace(trial.inference, contract=Contract.from_config(config["contract"]), parts=parts)
+    settings = typed(config, InferenceSettings)
+    parts = eqx.filter_jit(lambda: inference_template(settings))()
+    several = replace(trial.inference, contract=settings.contract, parts=parts)
     specs = [TaskSpec("goal", 2.0), TaskSpec("velocity", -1.0)]
     toy = evaluate(on_the_toy(trial, inference=several), specs, 1)
     assert set(toy.summary["families"]) == {"goal", "velocity"}

@@ -1,7 +1,9 @@
 """A checkpoint is the old one or the new one, whole, whatever happens."""
 
+import json
 import os
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -10,9 +12,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import safetensors.numpy
 
 from rebody.errors import RebodyError
-from rebody.store import checkpoint, load_checkpoint, read_meta, save_checkpoint, tree_hash
+from rebody.store import checkpoint, load_checkpoint, read_meta, save_checkpoint, tree_hash, tree_to_arrays
 
 META = {"step": 3, "best": float("-inf"), "name": "run"}
 
@@ -66,6 +69,24 @@ def test_one_flipped_bit_in_any_byte_is_found(folder, flip):
 def test_a_cut_file_is_found(folder, length):
     path = folder / checkpoint.FILE
     path.write_bytes(path.read_bytes()[:length])
+    with pytest.raises(RebodyError, match="is damaged"):
+        load_checkpoint(folder, state())
+
+
+@pytest.mark.parametrize("meta", ["null", "[]", "3", "", "{", "[" * 100_000])
+def test_what_is_no_object_is_damaged(meta, folder):
+    arrays = tree_to_arrays(state())
+    header = {"format_version": "1", "meta": meta, "sha256": checkpoint._sha256(arrays, meta)}
+    safetensors.numpy.save_file(arrays, folder / checkpoint.FILE, metadata=header)
+    with pytest.raises(RebodyError, match="is damaged"):
+        load_checkpoint(folder, state())
+
+
+@pytest.mark.parametrize(("dtype", "size"), [("BF16", 2), ("F8_E4M3", 1), ("C64", 8)])
+def test_types_that_are_never_stored_are_refused(dtype, size, folder):
+    described = {"w": {"dtype": dtype, "shape": [1], "data_offsets": [0, size]}}
+    header = json.dumps(described | {"__metadata__": {"format_version": "1"}}).encode()
+    (folder / checkpoint.FILE).write_bytes(struct.pack("<Q", len(header)) + header + bytes(size))
     with pytest.raises(RebodyError, match="is damaged"):
         load_checkpoint(folder, state())
 

@@ -5,6 +5,7 @@ from typing import Literal
 import jax.numpy as jnp
 
 from rebody.agents.agent import Agent, FlatAgent, IdleAgent, OracleAgent, ReadoutAgent, RetrainAgent, ReuseAgent
+from rebody.agents.fits import check_predictor, check_slots
 from rebody.agents.parts import (
     Inference,
     LoadedFlat,
@@ -73,6 +74,7 @@ def check_tracker_of(what: str, part: LoadedHighLevel | LoadedStepPredictor, tra
 def check_step_predictor(part: LoadedStepPredictor, tracker: LoadedTracker, inference: Inference) -> None:
     """RebodyError if a step predictor knows another tracker, or not all that the module's subgoals may be about."""
     check_tracker_of("step predictor", part, tracker)
+    check_predictor(part, tracker)
     unknown = [FAMILIES[family].name for family in inference.contract.families if family not in SLOTS]
     if unknown:
         raise RebodyError(
@@ -95,6 +97,7 @@ def slot_chooser(inference: Inference, loaded: LoadedSlots | None, by: SlotsBy) 
             )
         return OneSlot(families[0])
     check_module_of("classifier", loaded, inference)
+    check_slots(loaded, inference)
     if by == "classifier":
         return loaded.parts.classifier
     if inference.parts.mixture is None:

@@ -1,20 +1,28 @@
 """From artifacts to parts."""
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Int
 
 from rebody.agents.belief import LiveBelief
+from rebody.agents.configs import (
+    ClassifierSettings,
+    FlatSettings,
+    HighLevelSettings,
+    InferenceSettings,
+    ScratchSettings,
+    StepPredictorSettings,
+    ToyPolicySettings,
+    TrackerSettings,
+    understood,
+)
 from rebody.agents.slots import SlotClassifier
-from rebody.bodies.robot import Reach
-from rebody.bodies.toys import Toy, make_toy
+from rebody.bodies.toys import Toy
 from rebody.control.flat import FlatPolicy, FlatView
 from rebody.control.high_level import HighLevelPolicy, PolicyView, TaskCode
 from rebody.control.sac import Actor, SACConfig
@@ -22,14 +30,15 @@ from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import StepPredictor
 from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
-from rebody.inference import InferenceConfig, InferenceModule
+from rebody.inference import InferenceModule
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import MixturePrior, no_mixture
 from rebody.inference.probe import Probe
 from rebody.jax_settings import own_jax_settings
 from rebody.nn import MLP
-from rebody.store import Artifact, arrays_into_tree, load_artifact
-from rebody.tasks import family_index
+from rebody.store import arrays_into_tree, load_artifact
+from rebody.store.typed import Typed
+from rebody.tasks import FAMILIES, family_index
 from rebody.types import AnyArray, Tree
 
 
@@ -148,121 +157,109 @@ class LoadedSlots:
     parts: SlotParts
 
 
-def inference_template(config: dict[str, Any]) -> InferenceParts:
+def inference_template(settings: InferenceSettings) -> InferenceParts:
     """Parts of the right shapes, to be filled with weights."""
-    inference, policy, mixture = config["inference"], config["high_level"], config.get("mixture")
-    actions = make_toy(**config["toy"]).actions
-    settings = InferenceConfig(**with_tuples(inference))
-    ranges = with_tuples(config["contract"]["target_ranges"])
-    view = PolicyView(tuple(policy["fields"]), tuple(policy["scales"]), settings.places)
-    weights = np.zeros((settings.latent + 1, len(ranges)), np.float32)
+    policy, module, ranges = settings.high_level, settings.inference, settings.contract.target_ranges
+    actions, mixture = settings.make_toy().actions, settings.mixture
+    view = PolicyView(policy.fields, policy.scales, module.places)
     return InferenceParts(
-        module=InferenceModule(settings, actions, jax.random.key(0)),
-        high_level=_policy_template(view, settings.latent, actions, policy),
+        module=InferenceModule(module, actions, jax.random.key(0)),
+        high_level=_policy_template(view, module.latent, actions, policy),
         told_policy=_policy_template(told_view(view, ranges), 2 * len(ranges), actions, policy),
-        probe=Probe(np.zeros(len(ranges), np.int32), weights, weights),
-        mixture=no_mixture(mixture["maximum"], settings.clustered) if mixture else None,
+        probe=_probe_template(module.latent, len(ranges)),
+        mixture=no_mixture(mixture.maximum, module.clustered) if mixture else None,
     )
 
 
-def tracker_template(config: dict[str, Any]) -> Tracker:
+def tracker_template(settings: TrackerSettings) -> Tracker:
     """A tracker of the right shapes, to be filled with weights."""
-    actor = _actor_template(config["observations"], config["actions"], config)
-    return Tracker(actor, Reach(**with_tuples(config["reach"])))
-
-
-def flat_template(config: dict[str, Any]) -> FlatPolicy:
-    """A flat policy of the right shapes, to be filled with weights."""
-    view = FlatView(tuple(map(tuple, config.get("places", ()))), config["reach"])
-    return FlatPolicy(_actor_template(config["observations"], config["actions"], config), view)
-
-
-def scratch_template(config: dict[str, Any]) -> ScratchParts:
-    """Parts of the right shapes, to be filled with weights."""
-    settings = InferenceConfig(**with_tuples(config["inference"]))
-    families = len(config["contract"]["target_ranges"])
-    weights = np.zeros((settings.latent + 1, families), np.float32)
-    return ScratchParts(
-        module=InferenceModule(settings, config["actions"], jax.random.key(0)),
-        policy=FlatPolicy(
-            _actor_template(config["observations"], config["actions"], config), FlatView(settings.places)
-        ),
-        probe=Probe(np.zeros(families, np.int32), weights, weights),
+    return Tracker(
+        _actor_template(settings.observations, settings.actions, settings.hidden, settings.projections), settings.reach
     )
 
 
-def slot_policy_template(config: dict[str, Any]) -> SlotPolicy:
+def flat_template(settings: FlatSettings) -> FlatPolicy:
+    """A flat policy of the right shapes, to be filled with weights."""
+    actor = _actor_template(settings.observations, settings.actions, settings.hidden, settings.projections)
+    return FlatPolicy(actor, FlatView(settings.places, settings.reach))
+
+
+def scratch_template(settings: ScratchSettings) -> ScratchParts:
+    """Parts of the right shapes, to be filled with weights."""
+    module = settings.inference
+    actor = _actor_template(settings.observations, settings.actions, settings.hidden, settings.projections)
+    return ScratchParts(
+        module=InferenceModule(module, settings.actions, jax.random.key(0)),
+        policy=FlatPolicy(actor, FlatView(module.places)),
+        probe=_probe_template(module.latent, len(settings.contract.target_ranges)),
+    )
+
+
+def slot_policy_template(settings: HighLevelSettings) -> SlotPolicy:
     """A high-level policy of a robot of the right shapes, to be filled with weights."""
-    slots = tuple((family_index(name), scale) for name, scale in config["slots"].items())
-    return SlotPolicy(_actor_template(config["observations"], len(slots), config), _view(config), slots)
+    slots = tuple((family_index(name), scale) for name, scale in settings.slots.items())
+    return SlotPolicy(
+        _actor_template(settings.observations, len(slots), settings.hidden, settings.projections), settings.view, slots
+    )
 
 
-def step_predictor_template(config: dict[str, Any]) -> StepPredictor:
+def step_predictor_template(settings: StepPredictorSettings) -> StepPredictor:
     """A step predictor of the right shapes, to be filled with weights."""
-    return StepPredictor(_actor_template(config["observations"], 1, config), Reach(**with_tuples(config["reach"])))
+    return StepPredictor(
+        _actor_template(settings.observations, 1, settings.hidden, settings.projections), settings.reach
+    )
 
 
-def slots_template(config: dict[str, Any]) -> SlotParts:
+def slots_template(settings: ClassifierSettings) -> SlotParts:
     """A classifier of the right shapes, to be filled with weights."""
-    families = tuple(config["families"])
-    net = MLP(config["latent"], len(families), tuple(config["hidden"]), key=jax.random.key(0))
-    return SlotParts(SlotClassifier(net, families), np.zeros(config["components"], np.int32))
+    net = MLP(settings.latent, len(settings.families), settings.hidden, key=jax.random.key(0))
+    return SlotParts(SlotClassifier(net, settings.families), np.zeros(settings.components, np.int32))
 
 
 @own_jax_settings()
 def load_inference(reference: str) -> Inference:
     """A shipped inference artifact by name, or one in a folder; RebodyError if it cannot be read."""
-    artifact = load_artifact(reference, "inference")
-    with _understood(artifact):
-        contract = Contract.from_config(artifact.config["contract"])
-        parts = _fill(inference_template, artifact)
-        return Inference(artifact.name, contract, parts, make_toy(**artifact.config["toy"]))
+    name, settings, parts = _load(reference, "inference", InferenceSettings, inference_template)
+    _check_indices(name, "probe.families", parts.probe.families, settings.contract.families)
+    return Inference(name, settings.contract, parts, settings.make_toy())
 
 
 def load_tracker(reference: str) -> LoadedTracker:
     """A shipped tracker artifact by name, or one in a folder; RebodyError if it cannot be read."""
-    artifact = load_artifact(reference, "tracker")
-    with _understood(artifact):
-        return LoadedTracker(artifact.name, artifact.config["robot"], _fill(tracker_template, artifact))
+    name, settings, tracker = _load(reference, "tracker", TrackerSettings, tracker_template)
+    return LoadedTracker(name, settings.robot, tracker)
 
 
 def load_flat(reference: str) -> LoadedFlat:
     """A shipped flat policy by name, or one in a folder; RebodyError if it cannot be read."""
-    artifact = load_artifact(reference, "flat")
-    with _understood(artifact):
-        config = artifact.config
-        return LoadedFlat(artifact.name, config["robot"], config["inference_hash"], _fill(flat_template, artifact))
+    name, settings, policy = _load(reference, "flat", FlatSettings, flat_template)
+    return LoadedFlat(name, settings.robot, settings.inference_hash, policy)
 
 
 def load_scratch(reference: str) -> LoadedScratch:
     """A shipped scratch artifact by name, or one in a folder; RebodyError if it cannot be read."""
-    artifact = load_artifact(reference, "scratch")
-    with _understood(artifact):
-        contract = Contract.from_config(artifact.config["contract"])
-        return LoadedScratch(artifact.name, artifact.config["robot"], contract, _fill(scratch_template, artifact))
+    name, settings, parts = _load(reference, "scratch", ScratchSettings, scratch_template)
+    _check_indices(name, "probe.families", parts.probe.families, settings.contract.families)
+    return LoadedScratch(name, settings.robot, settings.contract, parts)
 
 
 def load_high_level(reference: str) -> LoadedHighLevel:
     """A shipped high-level policy of a robot by name, or one in a folder; RebodyError if it cannot be read."""
-    artifact = load_artifact(reference, "high-level")
-    with _understood(artifact):
-        config, policy = artifact.config, _fill(slot_policy_template, artifact)
-        return LoadedHighLevel(artifact.name, config["robot"], config["inference_hash"], config["tracker_hash"], policy)
+    name, settings, policy = _load(reference, "high-level", HighLevelSettings, slot_policy_template)
+    return LoadedHighLevel(name, settings.robot, settings.inference_hash, settings.tracker_hash, policy)
 
 
 def load_step_predictor(reference: str) -> LoadedStepPredictor:
     """A shipped step predictor by name, or one in a folder; RebodyError if it cannot be read."""
-    artifact = load_artifact(reference, "step-predictor")
-    with _understood(artifact):
-        config, predictor = artifact.config, _fill(step_predictor_template, artifact)
-        return LoadedStepPredictor(artifact.name, config["robot"], config["tracker_hash"], predictor)
+    name, settings, predictor = _load(reference, "step-predictor", StepPredictorSettings, step_predictor_template)
+    return LoadedStepPredictor(name, settings.robot, settings.tracker_hash, predictor)
 
 
 def load_slots(reference: str) -> LoadedSlots:
     """A shipped classifier by name, or one in a folder; RebodyError if it cannot be read."""
-    artifact = load_artifact(reference, "classifier")
-    with _understood(artifact):
-        return LoadedSlots(artifact.name, artifact.config["inference_hash"], _fill(slots_template, artifact))
+    name, settings, parts = _load(reference, "classifier", ClassifierSettings, slots_template)
+    _check_indices(name, "of_cluster", parts.of_cluster, settings.families)
+    return LoadedSlots(name, settings.inference_hash, parts)
 
 
 def load_slots_of(inference: Inference, reference: str | None) -> LoadedSlots | None:
@@ -282,39 +279,34 @@ def told_view(view: PolicyView, target_ranges: Mapping[str, tuple[float, float]]
     return replace(view, places=task_code(target_ranges).places if view.places else ())
 
 
-def _fill(template: Callable[[dict[str, Any]], Tree], artifact: Artifact) -> Tree:
-    """The template of an artifact's configuration with its weights; no random weights are drawn for it."""
-    shapes = eqx.filter_eval_shape(lambda: template(artifact.config))
-    zeros = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
-    return arrays_into_tree(zeros, artifact.arrays, f"artifact {artifact.name}")
+def _load(
+    reference: str, kind: str, settings_of: type[Typed], template: Callable[[Typed], Tree]
+) -> tuple[str, Typed, Tree]:
+    """Name, settings and parts of an artifact; no random weights are drawn, and none allocated before all fit."""
+    artifact = load_artifact(reference, kind)
+    settings = understood(artifact.config, settings_of, artifact.name)
+    shapes = eqx.filter_eval_shape(lambda: template(settings))
+    return artifact.name, settings, arrays_into_tree(shapes, artifact.arrays, f"artifact {artifact.name}")
 
 
-@contextmanager
-def _understood(artifact: Artifact) -> Iterator[None]:
-    """Turns what an unfamiliar config.json brings about into a message."""
-    try:
-        yield
-    except (KeyError, TypeError) as error:
+def _check_indices(name: str, array: str, found: Int[AnyArray, " index"], families: tuple[int, ...]) -> None:
+    """RebodyError where weights point at a family that the settings do not name."""
+    if unknown := set(np.asarray(found).tolist()).difference(families):
+        among = ", ".join(FAMILIES[family].name for family in families)
         raise RebodyError(
-            f"the settings of artifact '{artifact.name}' are not understood ({error}): another release of rebody "
-            "made it. Install that release, or train the artifact again."
-        ) from error
+            f"the weights of artifact '{name}' are not understood ({array}: {min(unknown)} is the index of none of "
+            f"{among}). Copy or make the artifact anew."
+        )
 
 
-def _policy_template(view: PolicyView, believed: int, actions: int, config: dict[str, Any]) -> HighLevelPolicy:
-    return HighLevelPolicy(_actor_template(view.size(believed), actions, config), view)
+def _policy_template(view: PolicyView, believed: int, actions: int, sizes: ToyPolicySettings) -> HighLevelPolicy:
+    return HighLevelPolicy(_actor_template(view.size(believed), actions, sizes.hidden, sizes.projections), view)
 
 
-def _view(config: dict[str, Any]) -> PolicyView:
-    seen = config["view"]
-    return PolicyView(tuple(seen["fields"]), tuple(seen["scales"]), tuple(map(tuple, seen["places"])))
+def _probe_template(latent: int, families: int) -> Probe:
+    weights = np.zeros((latent + 1, families), np.float32)
+    return Probe(np.zeros(families, np.int32), weights, weights)
 
 
-def _actor_template(observations: int, actions: int, config: dict[str, Any]) -> Actor:
-    sizes = SACConfig(hidden=tuple(config["hidden"]), projections=config["projections"])
-    return Actor(observations, actions, sizes, jax.random.key(0))
-
-
-def with_tuples(settings: dict[str, Any]) -> dict[str, Any]:
-    """Settings as they were before JSON made lists of their tuples."""
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
+def _actor_template(observations: int, actions: int, hidden: tuple[int, ...], projections: int) -> Actor:
+    return Actor(observations, actions, SACConfig(hidden=hidden, projections=projections), jax.random.key(0))

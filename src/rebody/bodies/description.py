@@ -107,6 +107,19 @@ def _root(root: _Root, path: Path) -> tuple[str, str, str] | str:
     )
 
 
+def reach_problems(reach: Reach) -> list[str]:
+    """What cannot be asked of any robot."""
+    problems = []
+    low, high = reach.speed
+    if not low < high or not reach.distance > 0:
+        problems.append("distance must be positive, speed = [slowest, fastest] ascending")
+    if reach.pitch is not None and not reach.pitch[0] < reach.pitch[1]:
+        problems.append("pitch = [lowest, highest] must be ascending")
+    if reach.jump is not None and not 0 < reach.jump[0] < reach.jump[1]:
+        problems.append("jump = [slowest, fastest] must be positive and ascending")
+    return problems
+
+
 def _check_values(spec: RobotSpec, path: Path) -> None:
     problems = []
     if spec.frame_skip < 1:
@@ -123,12 +136,6 @@ def _check_values(spec: RobotSpec, path: Path) -> None:
         problems.append("goal_ahead must be positive")
     if not spec.fall.max_pitch > 0 or not spec.fall.lasts_s >= 0:
         problems.append("[fall] max_pitch must be positive, lasts_s not negative")
-    low, high = spec.reach.speed
-    if not low < high or not spec.reach.distance > 0:
-        problems.append("[reach] distance must be positive, speed = [slowest, fastest] ascending")
-    if spec.reach.pitch is not None and not spec.reach.pitch[0] < spec.reach.pitch[1]:
-        problems.append("[reach] pitch = [lowest, highest] must be ascending")
-    if spec.reach.jump is not None and not 0 < spec.reach.jump[0] < spec.reach.jump[1]:
-        problems.append("[reach] jump = [slowest, fastest] must be positive and ascending")
+    problems += [f"[reach] {problem}" for problem in reach_problems(spec.reach)]
     if problems:
         raise RebodyError(f"'{path}': {'; '.join(problems)}.")

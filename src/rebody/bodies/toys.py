@@ -163,9 +163,9 @@ class MassDamper(Toy):
     6.4 moves with the old velocity. Terminal speed max_force / damping: 3.5 m/s.
     """
 
-    mass: float = 1.0  # kg
-    damping: float = 2.0  # N s/m
-    max_force: float = 7.0  # N
+    mass: Positive = 1.0  # kg
+    damping: NotNegative = 2.0  # N s/m
+    max_force: NotNegative = 7.0  # N
 
     def step(self, state: ToyState, action: Float[AnyArray, "*batch action"], key: PRNGKeyArray) -> ToyState:
         """The action is the share of the largest force."""
@@ -181,7 +181,7 @@ class MassDamper(Toy):
 class PositionToy(Toy):
     """x' = x + a with |a| <= max_step (thesis 6.1)."""
 
-    max_step: float = 0.1  # m
+    max_step: NotNegative = 0.1  # m
 
     def step(self, state: ToyState, action: Float[AnyArray, "*batch action"], key: PRNGKeyArray) -> ToyState:
         """The action is the share of the largest step."""
@@ -196,12 +196,12 @@ class FullToy(MassDamper):
     A spring rights it: it stands at up to max_torque / stiffness = 2.25 rad, and pitch never wraps.
     """
 
-    gravity: float = 9.81  # m/s^2
-    max_lift: float = 45.0  # N, while on the floor
-    inertia: float = 1.0  # kg m^2
-    stiffness: float = 4.0  # N m/rad
-    turn_damping: float = 4.0  # N m s/rad
-    max_torque: float = 9.0  # N m
+    gravity: NotNegative = 9.81  # m/s^2
+    max_lift: NotNegative = 45.0  # N, while on the floor
+    inertia: Positive = 1.0  # kg m^2
+    stiffness: Positive = 4.0  # N m/rad
+    turn_damping: NotNegative = 4.0  # N m s/rad
+    max_torque: NotNegative = 9.0  # N m
 
     @property
     def actions(self) -> int:
@@ -261,7 +261,7 @@ def _ripple(state: ToyState) -> Float[AnyArray, "*batch"]:
     return jnp.sin(2 * jnp.pi * state.time / disturbance.ripple_period + disturbance.ripple_phase)
 
 
-TOYS: dict[str, Callable[..., Toy]] = {"mass-damper": MassDamper, "position": PositionToy, "full": FullToy}
+TOYS: dict[str, type[Toy]] = {"mass-damper": MassDamper, "position": PositionToy, "full": FullToy}
 
 
 def make_toy(kind: str, **settings: float) -> Toy:

@@ -7,10 +7,11 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from rebody.control.sac import Actor, SACConfig
+from rebody.ranges import Positive
 from rebody.tasks.families import FAMILIES
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
-Places = tuple[tuple[str, float], ...]
+Places = tuple[tuple[str, Positive], ...]
 """Fields that a belief says the places of, and what both are divided by."""
 FARTHEST = 2.0
 """A place is seen as this far ahead at most, in units of its scale: one farther off asks for nothing else."""
@@ -34,7 +35,7 @@ class PolicyView:
 
     fields: tuple[str, ...]
     """Of the global state."""
-    scales: tuple[float, ...]
+    scales: tuple[Positive, ...]
     """What each of them is divided by."""
     places: Places = ()
     """What a belief says the places of; none for one that is seen as it is."""

@@ -16,7 +16,7 @@ from jaxtyping import Float, Key, PRNGKeyArray
 
 from rebody.errors import RebodyError
 from rebody.nn import MLP, MultiScale
-from rebody.ranges import Copies, Finite, Number, Positive, Rate, Share, Updates
+from rebody.ranges import Copies, Finite, Layers, Number, Positive, Rate, Share, Updates
 from rebody.types import AnyArray, Tree
 
 LOG_STD_RANGE = (-5.0, 1.0)
@@ -26,7 +26,7 @@ LOG_STD_RANGE = (-5.0, 1.0)
 class SACConfig:
     """Hyperparameters of soft actor-critic."""
 
-    hidden: tuple[Copies, ...] = (256, 256)
+    hidden: Layers = (256, 256)
     """Units of each hidden layer of actor and critics."""
     projections: Number = 0
     """Learned differences of the inputs that the networks see at several sharpnesses; 0 for none."""

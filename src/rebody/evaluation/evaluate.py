@@ -22,6 +22,7 @@ from rebody.agents.build import (
 )
 from rebody.agents.clock import Clock, EvenClock, PredictedClock
 from rebody.agents.controller import Controller, FlatController, TrackerController
+from rebody.agents.fits import check_sizes
 from rebody.agents.parts import (
     Inference,
     LoadedFlat,
@@ -286,6 +287,9 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
     if trial.step_predictor is not None:
         assert trial.tracker is not None
         check_step_predictor(trial.step_predictor, trial.tracker, trial.inference)
+    for part in (trial.tracker, trial.flat, trial.scratch, trial.high_level):
+        if part is not None:
+            check_sizes(part, trial.robot, trial.inference.parts.module.encoder)
 
 
 def _without_slot(trial: Trial, specs: list[TaskSpec]) -> list[str]:

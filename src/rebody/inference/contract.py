@@ -1,9 +1,9 @@
 """What an inference module expects of a body before it may be attached to it."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from rebody.errors import RebodyError
+from rebody.ranges import Decisions, Finite, Positive
 from rebody.tasks import RewardForm, family_index
 from rebody.types import DECISION_DT
 
@@ -16,13 +16,13 @@ class Contract:
 
     fields: tuple[str, ...]
     """Fields of the global state that the encoder sees (m, m/s, rad, rad/s)."""
-    window: int | None
+    window: Decisions | None
     """Decisions that a belief rests on; None for all since the episode began."""
-    target_ranges: dict[str, tuple[float, float]]
+    target_ranges: dict[str, tuple[Finite, Finite]]
     """Smallest and largest target per family."""
     reward: RewardForm
     """Form of the reward that the encoder hears."""
-    decision_dt: float = DECISION_DT
+    decision_dt: Positive = DECISION_DT
     """Seconds between two transitions."""
     version: int = CONTRACT_VERSION
 
@@ -50,18 +50,3 @@ class Contract:
         if self.decision_dt == DECISION_DT:
             return []
         return [f"it expects a decision every {self.decision_dt:g} s, here one takes {DECISION_DT} s"]
-
-    def to_config(self) -> dict[str, Any]:
-        """For config.json."""
-        return asdict(self)
-
-    @classmethod
-    def from_config(cls, config: dict[str, Any]) -> "Contract":
-        """From config.json; RebodyError for a version that this release cannot read."""
-        if config.get("version") != CONTRACT_VERSION:
-            raise RebodyError(
-                f"the module's contract has version {config.get('version')}, this release reads "
-                f"{CONTRACT_VERSION}. Train the module again, or install the release that made it."
-            )
-        ranges = {name: (low, high) for name, (low, high) in config["target_ranges"].items()}
-        return cls(**{**config, "fields": tuple(config["fields"]), "target_ranges": ranges})

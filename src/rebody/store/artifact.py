@@ -19,12 +19,14 @@ from rebody.store.files import WEIGHTS as LARGEST_WEIGHTS
 from rebody.store.folders import STAGE, replace_together, settle
 from rebody.store.trees import tree_to_arrays
 
-FORMAT_VERSION = 1
+FORMAT_VERSION, LARGEST_VERSION = 1, 10**6
 SHIPPED = Path(__file__).parents[1] / "artifacts"
 
 WEIGHTS, CONFIG, CARD, LOG = "weights.safetensors", "config.json", "card.md", "log.csv"
 HASHED = (WEIGHTS, CONFIG, CARD, LOG)
 MANIFEST = "manifest.json"  # holds the others' hashes
+LONGEST_NAME = 100
+"""Characters of a kind or an array's name."""
 LIMITS = {WEIGHTS: LARGEST_WEIGHTS, CONFIG: TEXT, CARD: TEXT, LOG: DATA, MANIFEST: TEXT}
 
 
@@ -52,7 +54,11 @@ def save_artifact(path: Path, *, kind: str, config: dict[str, Any], weights: Any
     """
     path = Path(os.path.abspath(path))
     arrays = tree_to_arrays(weights)
-    _refuse_non_finite(arrays, path)
+    if faulty := _not_finite(arrays):
+        raise RebodyError(
+            f"{path} is not written: {faulty} would hold values that are not finite. "
+            "The training diverged; try a smaller learning rate or another seed."
+        )
     if path.exists() and not path.is_dir():
         raise RebodyError(f"{path} is a file; an artifact is a folder. Choose another folder.")
     content = {
@@ -76,7 +82,8 @@ def load_artifact(reference: str | Path, kind: str | None = None) -> Artifact:
     A `Path` is always a folder, and so is what holds a separator, such as `./position`.
 
     Raises:
-        RebodyError: it is unknown, incomplete, damaged, of another kind or of another format version.
+        RebodyError: it is unknown, incomplete, damaged, of another kind or of another format version, or a weight is
+            not finite.
     """
     path = _find(reference, kind)
     manifest, content = _read_all(path)
@@ -91,8 +98,8 @@ def load_artifact(reference: str | Path, kind: str | None = None) -> Artifact:
         kind=manifest["kind"],
         config=_parse_object(content[CONFIG], path / CONFIG),
         arrays=_parse_weights(content[WEIGHTS], path / WEIGHTS),
-        card=content[CARD].decode(),
-        log=content[LOG].decode(),
+        card=_parse_text(content[CARD], path / CARD),
+        log=_parse_text(content[LOG], path / LOG),
     )
 
 
@@ -121,13 +128,10 @@ def shipped_artifacts() -> list[tuple[str, str]]:
 # writing
 
 
-def _refuse_non_finite(arrays: dict[str, np.ndarray], path: Path) -> None:
+def _not_finite(arrays: dict[str, np.ndarray]) -> str:
+    """Names of the first few arrays that hold values that are not finite."""
     faulty = [name for name, array in arrays.items() if not np.isfinite(array).all()]
-    if faulty:
-        raise RebodyError(
-            f"{path} is not written: {', '.join(faulty[:4])} would hold values that are not finite. "
-            "The training diverged; try a smaller learning rate or another seed."
-        )
+    return ", ".join(name[:LONGEST_NAME] for name in faulty[:4])
 
 
 def _to_json(value: Any) -> bytes:
@@ -191,7 +195,8 @@ def _read_manifest(path: Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise _missing(path, MANIFEST) from None
     version, kind, files = (manifest.get(key) for key in ("format_version", "kind", "files"))
-    if version is None or not isinstance(kind, str) or not isinstance(files, dict):
+    is_sound = isinstance(version, int) and abs(version) <= LARGEST_VERSION and isinstance(files, dict)
+    if not is_sound or not isinstance(kind, str) or len(kind) > LONGEST_NAME:
         raise _damaged(path / MANIFEST)
     if version != FORMAT_VERSION:
         raise RebodyError(
@@ -219,18 +224,30 @@ def _read_hashed(path: Path, name: str, sha256: Any) -> bytes:
 def _parse_object(data: bytes, path: Path) -> dict[str, Any]:
     try:
         value = json.loads(data)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise _damaged(path) from error
     if not isinstance(value, dict):
         raise _damaged(path)
     return value
 
 
+def _parse_text(data: bytes, path: Path) -> str:
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        raise _damaged(path) from error
+
+
 def _parse_weights(data: bytes, path: Path) -> dict[str, np.ndarray]:
     try:
-        return safetensors.numpy.load(data)
+        arrays = safetensors.numpy.load(data)
     except SafetensorError as error:
         raise _damaged(path) from error
+    except KeyError as error:
+        raise RebodyError(f"{path} holds weights of type {error}, which NumPy lacks. Store them as F32.") from error
+    if faulty := _not_finite(arrays):
+        raise RebodyError(f"{path} holds values that are not finite, in {faulty}. Copy or make the artifact anew.")
+    return arrays
 
 
 def _missing(path: Path, name: str) -> RebodyError:

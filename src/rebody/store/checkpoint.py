@@ -94,9 +94,12 @@ def _read_checked(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
             "Continue with the version that began the run, or start in another folder."
         )
     meta_json = header.get("meta", "")
-    if header.get("sha256") != _sha256(arrays, meta_json):
-        raise _damaged(path)
-    return arrays, json.loads(meta_json)
+    try:
+        if header.get("sha256") == _sha256(arrays, meta_json) and isinstance(meta := json.loads(meta_json), dict):
+            return arrays, meta
+    except (ValueError, RecursionError, TypeError) as error:  # the last for types that are never stored
+        raise _damaged(path) from error
+    raise _damaged(path)
 
 
 def _sha256(arrays: dict[str, np.ndarray], meta_json: str) -> str:
@@ -108,7 +111,7 @@ def _read(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray]]:
     try:
         with safe_open(path, framework="np") as file:
             return file.metadata() or {}, file.get_tensors()
-    except SafetensorError as error:
+    except (SafetensorError, TypeError, AttributeError) as error:  # the latter two for types that NumPy lacks
         raise _damaged(path) from error
 
 

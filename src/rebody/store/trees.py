@@ -37,13 +37,14 @@ def tree_to_arrays(tree: Any) -> dict[str, np.ndarray]:
 def arrays_into_tree(template: Tree, arrays: Mapping[str, np.ndarray], what: str) -> Tree:
     """The template with its array leaves replaced by `arrays`: the inverse of `tree_to_arrays`.
 
-    NumPy leaves come back as writable NumPy arrays, JAX leaves as JAX arrays, static leaves as they
-    are in the template. `what` names the arrays' origin in the message, such as "artifact goal-velocity".
+    NumPy leaves come back as writable NumPy arrays, JAX leaves and leaves that are shapes alone
+    (`equinox.filter_eval_shape`) as JAX arrays, static leaves as they are in the template. `what` names the arrays'
+    origin in the message, such as "artifact goal-velocity".
 
     Raises:
         RebodyError: names, shapes or dtypes are not exactly those of the template.
     """
-    faults = _faults(tree_to_arrays(template), arrays)
+    faults = _faults({name: _described(leaf) for name, leaf in _named_arrays(template)}, arrays)
     if faults:
         more = f" and {len(faults) - SHOWN_FAULTS} more" if len(faults) > SHOWN_FAULTS else ""
         raise RebodyError(
@@ -69,7 +70,7 @@ def _named_arrays(tree: Any) -> list[tuple[str, Any]]:
 
 
 def _is_stored(leaf: Any) -> bool:
-    return eqx.is_array(leaf) or isinstance(leaf, np.ndarray | np.generic)
+    return eqx.is_array(leaf) or isinstance(leaf, np.ndarray | np.generic | jax.ShapeDtypeStruct)
 
 
 def _is_random_key(leaf: Any) -> bool:
@@ -87,23 +88,24 @@ def _to_numpy(name: str, leaf: Any) -> np.ndarray:
 def _like(leaf: Any, array: np.ndarray) -> Any:
     if _is_random_key(leaf):
         return jax.random.wrap_key_data(jnp.array(array), impl=jax.random.key_impl(leaf))
-    if isinstance(leaf, jax.Array):
+    if isinstance(leaf, jax.Array | jax.ShapeDtypeStruct):
         return jnp.array(array)  # a copy, so that later writes to `array` cannot reach it
     if isinstance(leaf, np.generic):
         return array[()]
     return np.array(array)
 
 
-def _faults(expected: Mapping[str, np.ndarray], found: Mapping[str, np.ndarray]) -> list[str]:
+def _faults(expected: Mapping[str, str], found: Mapping[str, np.ndarray]) -> list[str]:
     missing = [f"{name} is missing" for name in expected if name not in found]
     unexpected = [f"{name} is unexpected" for name in found if name not in expected]
     different = [
-        f"{name} is {_describe(found[name])} instead of {_describe(array)}"
-        for name, array in expected.items()
-        if name in found and _describe(found[name]) != _describe(array)
+        f"{name} is {_described(found[name])} instead of {wanted}"
+        for name, wanted in expected.items()
+        if name in found and _described(found[name]) != wanted
     ]
     return missing + unexpected + different
 
 
-def _describe(array: np.ndarray) -> str:
+def _described(leaf: Any) -> str:
+    array = jax.random.key_data(leaf) if _is_random_key(leaf) else leaf
     return f"{array.dtype}{list(array.shape)}"

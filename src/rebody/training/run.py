@@ -11,12 +11,14 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass, field
 from itertools import accumulate
 from pathlib import Path
-from typing import IO, Any, Protocol, TypeVar, runtime_checkable
+from typing import IO, Annotated, Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
+from msgspec import Meta
 
 from rebody.errors import RebodyError
 from rebody.ranges import check_seed
@@ -24,6 +26,7 @@ from rebody.store import holds_checkpoint, load_checkpoint, recover, save_checkp
 from rebody.store.artifact import MANIFEST
 from rebody.store.checkpoint import FOLDER
 from rebody.store.folders import check_space
+from rebody.store.typed import Misfit, typed
 from rebody.training.curves import Curves
 from rebody.training.progress import Metrics, progress
 
@@ -42,6 +45,20 @@ State = TypeVar("State", bound=RunState)
 
 class Interrupted(Exception):
     """Ctrl-C during training; the run is checkpointed."""
+
+
+@dataclass(frozen=True)
+class RunMeta:
+    """What a checkpoint says beside the state."""
+
+    settings: dict[str, Any]
+    """That identify the run."""
+    wall_s: Annotated[float, Meta(ge=0)]
+    """Seconds of training so far."""
+    history: list[dict[str, float]]
+    """What every iteration measured."""
+    changes: list[str] = field(default_factory=list)
+    """How the run's length was changed in the middle of it."""
 
 
 class Run:
@@ -109,17 +126,37 @@ class Run:
         check_space(self.out, size if found else 2 * size)
         if found is None:
             return state
-        state, meta = found
-        self.wall_s, self.history, self.changes = meta["wall_s"], meta["history"], meta.get("changes", [])
-        before = {name: meta["settings"][name] for name in self._length}
+        state, meta = found[0], self._understood(found[1])
+        if int(state.iteration) != len(meta.history) or _faults(state):
+            raise self._foreign("its state is not that of its history, or not finite")
+        self.wall_s, self.history, self.changes = meta.wall_s, meta.history, meta.changes
+        before = {name: meta.settings[name] for name in self._length}
         if self.finish:
             self.settings |= before
         elif before != self.length:
             self.changes.append(f"{_written(before)} until iteration {self.iterations}, then {_written(self.length)}")
         return state
 
-    def _check_settings(self, meta: dict[str, Any]) -> None:
-        before, now, done = meta["settings"], self.settings, len(meta["history"])
+    def _understood(self, said: Any) -> RunMeta:
+        try:
+            meta = typed(said, RunMeta)
+        except Misfit as misfit:
+            raise self._foreign(str(misfit)) from misfit
+        for name in self._length:
+            turns = meta.settings.get(name)
+            if type(turns) is not int or turns < 0:
+                raise self._foreign(f"settings.{name}: a number of iterations is needed")
+        return meta
+
+    def _foreign(self, what: str) -> RebodyError:
+        return RebodyError(
+            f"the checkpoint in {self._checkpoint} is not understood ({what}): another release of rebody made it, or "
+            "it is damaged. Go on with that release, or choose another --out."
+        )
+
+    def _check_settings(self, said: dict[str, Any]) -> None:
+        meta = self._understood(said)
+        before, now, done = meta.settings, self.settings, len(meta.history)
         changed = {name for name in before.keys() | now.keys() if before.get(name) != now.get(name)}
         if others := sorted(changed.difference(self._length)):
             raise RebodyError(
@@ -198,8 +235,8 @@ class Run:
 
     def _save(self, state: RunState) -> None:
         _check_finite(_faults(state), self.out)  # the last update may have broken what no loss shows yet
-        meta = {"settings": self.settings, "wall_s": self.wall_s, "history": self.history, "changes": self.changes}
-        save_checkpoint(self._checkpoint, state, meta)
+        meta = RunMeta(self.settings, self.wall_s, self.history, self.changes)
+        save_checkpoint(self._checkpoint, state, asdict(meta))
 
     def _log(self, curves: Curves, metrics: Metrics, iteration: int) -> None:
         self.history.append(metrics)

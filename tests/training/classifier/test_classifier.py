@@ -64,7 +64,7 @@ def test_a_module_of_one_family_needs_none(own_module, tmp_path, capsys):
 
 
 def test_the_world_is_the_modules_own(full_module):
-    world = ToyWorld.of(load_artifact(str(full_module), "inference").config["training"])
+    world = ToyWorld.of(load_artifact(str(full_module), "inference"))
     assert world.randomisation == Randomisation()
     assert {base_task.family for base_task in world.tasks.base_tasks} == {"goal", "velocity", "stand"}
     tasks, disturbance = world.draw(jax.random.key(0), 50, 0.0, disturbed=True)

@@ -9,12 +9,17 @@ import pytest
 from rebody.bodies.toys import make_toy, no_disturbance
 from rebody.control.high_level import PolicyView
 from rebody.errors import RebodyError
-from rebody.tasks import FAMILIES
+from rebody.inference import InferenceConfig
+from rebody.tasks import FAMILIES, BaseTask, TaskDistribution
 from rebody.training.inference import PRESETS
+from rebody.training.inference.config import MixtureConfig
 
 MOVES = {"mass-damper": {"x", "vx"}, "position": {"x", "vx"}, "full": {"x", "z", "pitch", "vx", "vz", "pitch_rate"}}
 SHOWN_BY = {"goal": "x", "velocity": "x", "stand": "pitch", "jump": "vz"}
 """The field without which a family's reward could not be understood."""
+
+
+LARGE = InferenceConfig(fields=("x", "vx"), scales=(1.0, 1.0), latent=300)
 
 
 @pytest.fixture(params=PRESETS)
@@ -82,3 +87,17 @@ def test_every_field_has_its_scale(option):
     }
     with pytest.raises(RebodyError, match=f"{option} must give a number for each of"):
         replace(preset, **changes[option])
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"policy_fields": ("vx", "vx"), "policy_scales": (1.0, 1.0)}, "--policy-scales go with fields of which one"),
+        ({"mixture": MixtureConfig(maximum=4096), "inference": LARGE}, "--mixture.maximum 4096 is too much"),
+        ({"tasks": TaskDistribution((BaseTask("goal", 2.0, -2.0),))}, r"goal cannot have targets from 2\.0 to -2\.0"),
+        ({"tasks": TaskDistribution((BaseTask("goal", 0.0, 0.0),))}, "goal cannot have targets"),
+    ],
+)
+def test_what_no_artifact_may_say_is_not_trained(change, said):
+    with pytest.raises(RebodyError, match=said):
+        replace(PRESETS["goal-velocity"](), **change)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rebody.ranges import Copies, Count, Number, Rate, Share
+from rebody.ranges import Copies, Count, Layers, Number, Rate, Share
 
 
 @dataclass(frozen=True)
@@ -13,7 +13,7 @@ class ClassifierConfig:
     """Episodes of 20 s that the module's own policy acts in, half of them disturbed as in its training."""
     switch_share: Share = 0.5
     """Share of episodes in which the task changes once, at any decision."""
-    hidden: tuple[Copies, ...] = (32,)
+    hidden: Layers = (32,)
     """Units of each hidden layer."""
     learning_rate: Rate = 3e-3
     """Adam's step size."""

@@ -1,7 +1,6 @@
 """Beliefs on the toy: what the classifier learns from, and what the slots of clusters are found on."""
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -11,12 +10,14 @@ from jaxtyping import Float, Int, PRNGKeyArray
 
 from rebody.agents.agent import Command, ReuseAgent
 from rebody.agents.build import build_agent
-from rebody.agents.parts import Inference, with_tuples
+from rebody.agents.configs import understood
+from rebody.agents.parts import Inference
 from rebody.agents.rollout import Episodes, rollout_on_toy
 from rebody.agents.slots import OneSlot
 from rebody.bodies.toys import Disturbance, Randomisation, no_disturbance
 from rebody.inference.mixture.padded import MixturePrior
-from rebody.tasks import BaseTask, TaskDistribution, achieved_by_way_of
+from rebody.store import Artifact
+from rebody.tasks import TaskDistribution, achieved_by_way_of
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
 DECISIONS = 200
@@ -34,10 +35,11 @@ class ToyWorld:
     randomisation: Randomisation
 
     @classmethod
-    def of(cls, training: dict[str, Any]) -> "ToyWorld":
-        """From the artifact's training settings."""
-        base_tasks = tuple(BaseTask(**base_task) for base_task in training["tasks"]["base_tasks"])
-        return cls(TaskDistribution(base_tasks), Randomisation(**with_tuples(training["randomisation"])))
+    def of(cls, module: Artifact) -> "ToyWorld":
+        """From the artifact's training settings; RebodyError where they do not tell."""
+        training = module.config["training"]
+        said = {name: training[name] for name in ("tasks", "randomisation") if name in training}
+        return understood(said, cls, module.name)
 
     def draw(self, key: PRNGKeyArray, episodes: int, switch_share: float, *, disturbed: bool):
         """Active tasks [time, episode], and how each episode's toy departs from the nominal one."""

@@ -7,6 +7,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
+from rebody.agents.configs import ClassifierSettings
 from rebody.agents.parts import Inference, SlotParts
 from rebody.agents.slots import SlotChooser, SlotClassifier, SlotOfCluster
 from rebody.store import save_artifact, tree_hash
@@ -30,15 +31,15 @@ def save_slots(
         tasks, disturbance = world.draw(jax.random.fold_in(jax.random.key(seed), 1), HELD_OUT, 0.0, disturbed=False)
         slots = slots_of_clusters(module, tasks, disturbance)
         choosers["clusters"] = SlotOfCluster(module.parts.mixture, slots)
-    stored = {
-        "inference": module.name,
-        "inference_hash": tree_hash(module.parts.module),
-        "latent": module.parts.module.encoder.latent,
-        "families": classifier.families,
-        "hidden": config.hidden,
-        "components": len(slots),
-        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
-    }
+    stored = ClassifierSettings(
+        inference=module.name,
+        inference_hash=tree_hash(module.parts.module),
+        latent=module.parts.module.encoder.latent,
+        families=classifier.families,
+        hidden=config.hidden,
+        components=len(slots),
+        training=asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
+    )
     rows = {}
     for name, chooser in choosers.items():
         for disturbed in (False, True):
@@ -54,7 +55,7 @@ def save_slots(
     )
     text = card(f"Slots: {module.name}", what, run, seed, rows)
     parts = SlotParts(classifier, slots)
-    return save_artifact(run.out, kind="classifier", config=stored, weights=parts, card=text, log=run.log)
+    return save_artifact(run.out, kind="classifier", config=asdict(stored), weights=parts, card=text, log=run.log)
 
 
 def wrong_slots(chooser: SlotChooser, module: Inference, world: ToyWorld, *, disturbed: bool) -> float:

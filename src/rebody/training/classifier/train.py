@@ -52,7 +52,7 @@ def train_classifier(
     if len(module.contract.families) < 2:
         raise RebodyError(f"'{module.name}' knows one family only: there is no slot to choose.")
     with Run(out, asdict(config) | {"inference": inference, "seed": seed}, resume=resume, finish=finish) as run:
-        world, key = ToyWorld.of(load_artifact(inference, "inference").config["training"]), jax.random.key(seed)
+        world, key = ToyWorld.of(load_artifact(inference, "inference")), jax.random.key(seed)
         seen = listen(module, world, config, jax.random.fold_in(key, 2**31 - 1))
         state = run.restore(initial_state(module, config, key))
         state = run.loop(state, lambda state: iterate(state, seen, config, key), config.iterations, "classifier")

@@ -4,6 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rebody.agents.build import build_agent
+from rebody.agents.configs import FlatSettings
 from rebody.agents.controller import FlatController
 from rebody.agents.parts import Inference
 from rebody.bodies import RobotSpec
@@ -32,18 +33,18 @@ def save_flat(policy: FlatPolicy, module: Inference, spec: RobotSpec, config: Fl
     """Measure, write artifact and card."""
     figures = measure(policy, module, spec)
     actor = policy.actor
-    stored = {
-        "robot": spec.name,
-        "inference": module.name,
-        "inference_hash": tree_hash(module.parts.module),
-        "reach": policy.view.reach,
-        "places": policy.view.places,
-        "observations": actor.observations,
-        "actions": actor.actions,
-        "hidden": config.sac.hidden,
-        "projections": config.sac.projections,
-        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
-    }
+    stored = FlatSettings(
+        robot=spec.name,
+        inference=module.name,
+        inference_hash=tree_hash(module.parts.module),
+        reach=policy.view.reach,
+        places=policy.view.places,
+        observations=actor.observations,
+        actions=actor.actions,
+        hidden=config.sac.hidden,
+        projections=config.sac.projections,
+        training=asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
+    )
     condition = f"{TASKS} held-out tasks, 20 s"
     rows = rows_of(figures, condition)
     steps = run.iterations * config.steps * config.robots
@@ -52,4 +53,4 @@ def save_flat(policy: FlatPolicy, module: Inference, spec: RobotSpec, config: Fl
         f"subgoals. Trained on {steps:,} control steps with {run.iterations * config.updates:,} updates."
     )
     text = card(f"Flat policy: {spec.name}", what, run, seed, rows)
-    return save_artifact(run.out, kind="flat", config=stored, weights=policy, card=text, log=run.log)
+    return save_artifact(run.out, kind="flat", config=asdict(stored), weights=policy, card=text, log=run.log)

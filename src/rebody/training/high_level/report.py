@@ -4,6 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rebody.agents.build import build_agent
+from rebody.agents.configs import HighLevelSettings
 from rebody.agents.controller import TrackerController
 from rebody.agents.parts import Inference, LoadedTracker
 from rebody.bodies import RobotSpec
@@ -39,19 +40,19 @@ def save_high_level(
     """Measure, write artifact and card."""
     figures = measure(policy, module, TrackerController(tracker.tracker, spec.goal_ahead), spec)
     actor = policy.actor
-    stored = {
-        "robot": spec.name,
-        "inference": module.name,
-        "inference_hash": tree_hash(module.parts.module),
-        "tracker": tracker.name,
-        "tracker_hash": tree_hash(tracker.tracker),
-        "view": asdict(policy.view),
-        "slots": {FAMILIES[family].name: scale for family, scale in policy.slots},
-        "observations": actor.observations,
-        "hidden": config.sac.hidden,
-        "projections": config.sac.projections,
-        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
-    }
+    stored = HighLevelSettings(
+        robot=spec.name,
+        inference=module.name,
+        inference_hash=tree_hash(module.parts.module),
+        tracker=tracker.name,
+        tracker_hash=tree_hash(tracker.tracker),
+        view=policy.view,
+        slots={FAMILIES[family].name: scale for family, scale in policy.slots},
+        observations=actor.observations,
+        hidden=config.sac.hidden,
+        projections=config.sac.projections,
+        training=asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
+    )
     rows = rows_of(figures, f"{TASKS} held-out tasks, 20 s")
     decisions = run.iterations * config.steps * config.robots
     what = (
@@ -60,4 +61,4 @@ def save_high_level(
         f"control steps, with {run.iterations * config.updates:,} updates; module and tracker are frozen."
     )
     text = card(f"High-level policy: {spec.name}", what, run, seed, rows)
-    return save_artifact(run.out, kind="high-level", config=stored, weights=policy, card=text, log=run.log)
+    return save_artifact(run.out, kind="high-level", config=asdict(stored), weights=policy, card=text, log=run.log)

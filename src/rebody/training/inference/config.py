@@ -9,30 +9,9 @@ from rebody.control.high_level import PolicyView
 from rebody.control.sac import SACConfig
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
+from rebody.inference.mixture.settings import MixtureConfig
 from rebody.ranges import Copies, Count, Decisions, NotNegative, Number, Positive, Share
 from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
-
-
-@dataclass(frozen=True)
-class MixtureConfig:
-    """The mixture that clusters the latent (thesis 5.3.2), refitted from a warm start in every iteration."""
-
-    covariance_type: Literal["full", "diag"] = "full"
-    """Whether components may lie aslant."""
-    concentration: Positive = 5.0
-    """gamma of v_k ~ Beta(1, gamma)."""
-    prior_scale: Positive = 0.1
-    """Variance that the prior expects of a component in each dimension."""
-    components: Copies | None = None
-    """A fixed number of components, for comparison; by default it is found."""
-    points: Count = 2000
-    """Beliefs of a fit."""
-    from_decision: Number = 10
-    """Beliefs are taken from this decision of an episode on, when something is known."""
-    from_iteration: Number = 5
-    """First iteration with a fit; before it the prior is N(0, I)."""
-    maximum: Copies = 32
-    """Components that the loss can take."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +80,20 @@ class MetaConfig:
             ("--inference.scales", self.inference.fields, self.inference.scales),
         )
         for option, fields, scales in pairs:
+            if len(set(fields)) < len(fields):
+                raise RebodyError(f"{option} go with fields of which one comes twice: {', '.join(fields)}.")
             if len(fields) != len(scales):
                 raise RebodyError(
                     f"{option} must give a number for each of {', '.join(fields)}: {len(fields)}, not {len(scales)}."
                 )
 
+        if self.prior == "mixture" and not self.mixture.fits(self.inference.clustered):
+            raise RebodyError(
+                f"--mixture.maximum {self.mixture.maximum} is too much for a latent of {self.inference.latent}."
+            )
+        for task in self.tasks.base_tasks:
+            if task.low > task.high or task.low == task.high == 0:
+                raise RebodyError(f"a base task of {task.family} cannot have targets from {task.low} to {task.high}.")
         if (self.inference.window or 1) > self.decisions:
             raise RebodyError(
                 f"--inference.window {self.inference.window} is longer than --decisions {self.decisions}."

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import equinox as eqx
 
+from rebody.agents.configs import InferenceSettings, ToyPolicySettings
 from rebody.agents.parts import InferenceParts
 from rebody.bodies.toys import Toy, describe_toy
 from rebody.store import save_artifact
@@ -23,19 +24,14 @@ def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run
     figures = measure_in_depth(parts, toy, config, HELD_OUT)
     parts = eqx.tree_at(lambda p: p.probe, parts, fit(parts, toy, config, HELD_OUT, disturbed=True))
     contract, view = contract_of(config), config.policy_view
-    stored = {
-        "contract": contract.to_config(),
-        "inference": asdict(config.inference),
-        "mixture": asdict(config.mixture) if config.prior == "mixture" else None,
-        "high_level": {
-            "fields": view.fields,
-            "scales": view.scales,
-            "hidden": config.sac.hidden,
-            "projections": config.sac.projections,
-        },
-        "toy": describe_toy(toy),
-        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
-    }
+    stored = InferenceSettings(
+        contract=contract,
+        inference=config.inference,
+        mixture=config.mixture if config.prior == "mixture" else None,
+        high_level=ToyPolicySettings(view.fields, view.scales, config.sac.hidden, config.sac.projections),
+        toy=describe_toy(toy),
+        training=asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
+    )
     units = {
         f"{family.name} {figure}": family.unit for family in FAMILIES for figure in ("median", "p95", "read, disturbed")
     }
@@ -48,6 +44,5 @@ def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run
         f"Inference module (encoder, decoder, probe) and the toy's high-level policy, trained on a point mass "
         f"on {', '.join(contract.target_ranges)} tasks in {steps:,} toy steps. No robot took part."
     )
-    return save_artifact(
-        run.out, kind="inference", config=stored, weights=parts, card=card(title, what, run, seed, rows), log=run.log
-    )
+    text = card(title, what, run, seed, rows)
+    return save_artifact(run.out, kind="inference", config=asdict(stored), weights=parts, card=text, log=run.log)

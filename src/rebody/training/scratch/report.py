@@ -8,6 +8,7 @@ import jax
 import numpy as np
 
 from rebody.agents.agent import FlatAgent
+from rebody.agents.configs import ScratchSettings
 from rebody.agents.controller import FlatController
 from rebody.agents.parts import ScratchParts
 from rebody.agents.rollout import Episodes
@@ -54,16 +55,16 @@ def save_scratch(
     figures = measure(parts, meta, spec)
     parts = eqx.tree_at(lambda p: p.probe, parts, probe_of(parts, meta, spec))
     actor = parts.policy.actor
-    stored = {
-        "robot": spec.name,
-        "contract": contract_of(meta).to_config(),
-        "inference": asdict(config.inference),
-        "observations": actor.observations,
-        "actions": actor.actions,
-        "hidden": config.sac.hidden,
-        "projections": config.sac.projections,
-        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
-    }
+    stored = ScratchSettings(
+        robot=spec.name,
+        contract=contract_of(meta),
+        inference=config.inference,
+        observations=actor.observations,
+        actions=actor.actions,
+        hidden=config.sac.hidden,
+        projections=config.sac.projections,
+        training=asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
+    )
     rows = rows_of(figures, f"{TASKS} held-out tasks, 20 s")
     decisions = run.iterations * config.robots * config.decisions
     what = (
@@ -73,4 +74,4 @@ def save_scratch(
         f"{run.iterations * config.inference_updates:,} of the module."
     )
     text = card(f"From scratch: {spec.name}", what, run, seed, rows)
-    return save_artifact(run.out, kind="scratch", config=stored, weights=parts, card=text, log=run.log)
+    return save_artifact(run.out, kind="scratch", config=asdict(stored), weights=parts, card=text, log=run.log)

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from rebody.agents.configs import StepPredictorSettings
 from rebody.agents.parts import LoadedTracker
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.control.sac import SACBatch
@@ -60,16 +61,16 @@ def save_step_predictor(
 ) -> Path:
     """Measure it beside fixed strides, write artifact and card."""
     actor = predictor.actor
-    stored = {
-        "robot": spec.name,
-        "tracker": loaded.name,
-        "tracker_hash": tree_hash(loaded.tracker),
-        "reach": asdict(predictor.reach),
-        "observations": actor.observations,
-        "hidden": config.sac.hidden,
-        "projections": config.sac.projections,
-        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
-    }
+    stored = StepPredictorSettings(
+        robot=spec.name,
+        tracker=loaded.name,
+        tracker_hash=tree_hash(loaded.tracker),
+        reach=predictor.reach,
+        observations=actor.observations,
+        hidden=config.sac.hidden,
+        projections=config.sac.projections,
+        training=asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
+    )
     figures = measure(Deciding(actor), loaded.tracker, spec, config)
     rows = {f"{name}, predicted": f"{value:.3f}" for name, value in figures.items()}
     for stride in STRIDES:
@@ -82,4 +83,6 @@ def save_step_predictor(
         f"figures are means over the subgoals of {ROBOTS} robots that chase toys one decision ahead for {SECONDS:g} s."
     )
     text = card(f"Step predictor: {spec.name}", what, run, seed, rows)
-    return save_artifact(run.out, kind="step-predictor", config=stored, weights=predictor, card=text, log=run.log)
+    return save_artifact(
+        run.out, kind="step-predictor", config=asdict(stored), weights=predictor, card=text, log=run.log
+    )

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass, field
 
+from rebody.bodies.description import reach_problems
 from rebody.bodies.robot import Reach
 from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
+from rebody.errors import RebodyError
 from rebody.ranges import Copies, Count, NotNegative, Number, Positive, Rows, Share
 from rebody.training.tracker.commands import CommandDistribution
 
@@ -51,3 +53,8 @@ class TrackerConfig:
     """What the tracker is paid."""
     sac: SACConfig = field(default_factory=lambda: SACConfig(decay_updates=180_000))
     """Hyperparameters of soft actor-critic."""
+
+    def __post_init__(self):
+        """RebodyError for a reach that cannot be asked of any robot."""
+        if problems := reach_problems(self.reach):
+            raise RebodyError(f"--reach: {'; '.join(problems)}.")

@@ -8,6 +8,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float
 
+from rebody.agents.configs import TrackerSettings
 from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, RobotSpec
@@ -84,16 +85,16 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
     """Measure, write artifact and card."""
     figures = measure(tracker, spec)
     actor, reach = tracker.actor, tracker.reach
-    stored = {
-        "robot": spec.name,
-        "control_dt": spec.control_dt,
-        "reach": asdict(reach),
-        "observations": actor.observations,
-        "actions": actor.actions,
-        "hidden": config.sac.hidden,
-        "projections": config.sac.projections,
-        "training": asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
-    }
+    stored = TrackerSettings(
+        robot=spec.name,
+        control_dt=spec.control_dt,
+        reach=reach,
+        observations=actor.observations,
+        actions=actor.actions,
+        hidden=config.sac.hidden,
+        projections=config.sac.projections,
+        training=asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
+    )
     condition = f"{COMMANDS} held-out commands, {SECONDS:g} s"
     asked = {
         "goal": f"goals to +-{reach.distance:g} m",
@@ -119,7 +120,7 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
     return save_artifact(
         run.out,
         kind="tracker",
-        config=stored,
+        config=asdict(stored),
         weights=tracker,
         card=card(f"Tracker: {spec.name}", what, run, seed, rows),
         log=run.log,

@@ -1,0 +1,67 @@
+"""Whether parts have the sizes that a module and a robot need: what an artifact says of itself is not trusted."""
+
+from rebody.agents.parts import (
+    Inference,
+    LoadedFlat,
+    LoadedHighLevel,
+    LoadedScratch,
+    LoadedSlots,
+    LoadedStepPredictor,
+    LoadedTracker,
+)
+from rebody.bodies import RobotSpec
+from rebody.control.high_level import Places
+from rebody.control.sac import Actor
+from rebody.errors import RebodyError
+from rebody.inference.encoder import Encoder
+
+
+def check_sizes(part: LoadedTracker | LoadedFlat | LoadedScratch | LoadedHighLevel, spec: RobotSpec, module: Encoder):
+    """RebodyError where a policy does not see what the robot and the module's beliefs give, or moves other joints."""
+    joints = spec.tracker_inputs - (spec.smoothing_s > 0)
+    match part:
+        case LoadedTracker(tracker=tracker):
+            _check_actor(part.name, tracker.actor, tracker.actor.observations, spec.model.nu)
+        case LoadedFlat(policy=policy):
+            _check_places(part.name, policy.view.places, module)
+            _check_actor(part.name, policy.actor, policy.view.size(joints, module.latent), spec.model.nu)
+        case LoadedScratch(parts=parts):
+            own = parts.module.encoder.latent
+            _check_actor(part.name, parts.policy.actor, parts.policy.view.size(joints, own), spec.model.nu)
+        case LoadedHighLevel(policy=policy):
+            _check_places(part.name, policy.view.places, module)
+            _check_actor(part.name, policy.actor, policy.view.size(module.latent), len(policy.slots))
+
+
+def check_predictor(part: LoadedStepPredictor, tracker: LoadedTracker) -> None:
+    """RebodyError where a step predictor does not see commands as its tracker does."""
+    if part.predictor.reach != tracker.tracker.reach:
+        raise _misfit(part.name, "its reach is not that of its tracker")
+    _check_actor(part.name, part.predictor.actor, tracker.tracker.actor.observations, 1)
+
+
+def check_slots(part: LoadedSlots, module: Inference) -> None:
+    """RebodyError where a classifier does not see the module's beliefs, or chooses among other families."""
+    classifier, mixture = part.parts.classifier, module.parts.mixture
+    if len(classifier.net.weights[0]) != module.parts.module.encoder.latent:
+        raise _misfit(part.name, f"its latent is not that of '{module.name}'")
+    if set(classifier.families) != set(module.contract.families):
+        raise _misfit(part.name, f"its families are not those of '{module.name}'")
+    if mixture is not None and len(part.parts.of_cluster) != len(mixture.active):
+        raise _misfit(part.name, f"its clusters are not those of '{module.name}'")
+
+
+def _check_places(name: str, places: Places, module: Encoder) -> None:
+    spoken_of = tuple(zip(module.fields, module.scales, strict=True)) if module.kinds else ()
+    if places != spoken_of:
+        raise _misfit(name, "the places that it sees are not those that the module's beliefs speak of")
+
+
+def _check_actor(name: str, actor: Actor, sees: int, moves: int) -> None:
+    if (actor.observations, actor.actions) != (sees, moves):
+        given = f"sees {actor.observations} numbers and gives {actor.actions}"
+        raise _misfit(name, f"it {given}, where {sees} and {moves} are needed")
+
+
+def _misfit(name: str, what: str) -> RebodyError:
+    return RebodyError(f"'{name}' does not fit: {what}. Train it anew.")
