@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 __all__ = ["RebodyError", "load_agent", "load_inference"]
 
-register_environments()
+register_environments(trackers="rebody.training.tracker.env:TrackerEnv")
 
 
 _LOADERS = {"load_agent": "rebody.agents.live", "load_inference": "rebody.agents.parts"}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rebody.evaluation.results import EpisodeResult
+from rebody.evaluation.episode import EpisodeResult
 
 
 @pytest.fixture(scope="session")

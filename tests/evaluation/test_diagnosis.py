@@ -8,7 +8,8 @@ import pytest
 from rich.console import Console
 
 from rebody.evaluation.diagnosis import LADDER, Diagnosis, diagnose, diagnoses_among, diagnosis_tables, shares_of
-from rebody.evaluation.results import EpisodeResult, Results
+from rebody.evaluation.episode import EpisodeResult
+from rebody.evaluation.results import Results
 from rebody.report.diagnosis import plot_diagnosis
 from rebody.tasks.task_file import TaskSpec
 

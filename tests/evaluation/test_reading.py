@@ -7,8 +7,8 @@ import pytest
 
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, read_results, save_results
+from rebody.evaluation.episode import VECTORS
 from rebody.evaluation.reading import holds_results
-from rebody.evaluation.results import VECTORS
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rebody.evaluation.results import EpisodeResult, Results
+from rebody.evaluation.episode import EpisodeResult
+from rebody.evaluation.results import Results
 from rebody.report import plot_episode, plot_transfer
 from rebody.report.figures import draw_progress
 from rebody.report.style import figure

@@ -13,8 +13,8 @@ from rebody.cli.run import describe, shoot
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, save_results, summary_table
+from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.evaluate import Trial, take_yardsticks
-from rebody.evaluation.results import EpisodeResult
 from rebody.report import plot_episode, plot_transfer
 from rebody.store import shipped_artifacts
 from rebody.tasks.task_file import Switch, TaskSpec

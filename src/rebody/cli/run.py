@@ -12,8 +12,8 @@ from rebody.cli.output import PICTURES, check_output
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate
+from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.evaluate import Trial
-from rebody.evaluation.results import EpisodeResult
 from rebody.report import film, plot_episode
 from rebody.tasks.task_file import TaskSpec, parse_task
 

@@ -1,20 +1,18 @@
 """Tasks that change in mid-episode: how soon the new one is known, and done."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool
 
+from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.statistics import with_interval
 from rebody.tasks.figures import tolerance
 from rebody.types import DECISION_DT
 
-if TYPE_CHECKING:
-    from rebody.evaluation.results import EpisodeResult
 
-
-def summarise_changes(episodes: Sequence["EpisodeResult"]) -> dict[str, Any] | None:
+def summarise_changes(episodes: Sequence[EpisodeResult]) -> dict[str, Any] | None:
     """Medians [s] over the episodes whose base task changes, with 95 % intervals; None if there are none.
 
     `noticed_s`: from the change until family and sign are read rightly. `recovered_s`: until the error is within
@@ -33,18 +31,18 @@ def summarise_changes(episodes: Sequence["EpisodeResult"]) -> dict[str, Any] | N
     }
 
 
-def base_task_right(episode: "EpisodeResult") -> Bool[np.ndarray, " time"]:
+def base_task_right(episode: EpisodeResult) -> Bool[np.ndarray, " time"]:
     """Whether family and sign are read rightly from the belief after each decision."""
     right_family = np.array(episode.inferred_family) == np.array(episode.active_family)
     return right_family & (np.array(episode.inferred_target) * np.array(episode.active_target) > 0)
 
 
-def _changes_base_task(episode: "EpisodeResult") -> bool:
+def _changes_base_task(episode: EpisodeResult) -> bool:
     changes_family = episode.active_family[0] != episode.active_family[-1]
     return changes_family or episode.active_target[0] * episode.active_target[-1] < 0
 
 
-def _first_s(episode: "EpisodeResult", holds: Bool[np.ndarray, " time"]) -> float:
+def _first_s(episode: EpisodeResult, holds: Bool[np.ndarray, " time"]) -> float:
     """Seconds from the change to the first decision after it at which something holds."""
     active = list(zip(episode.active_family, episode.active_target, strict=True))
     after = holds[active.index(active[-1]) :]
@@ -52,5 +50,5 @@ def _first_s(episode: "EpisodeResult", holds: Bool[np.ndarray, " time"]) -> floa
     return float(decisions * DECISION_DT)
 
 
-def _within_tolerance(episode: "EpisodeResult") -> Bool[np.ndarray, " time"]:
+def _within_tolerance(episode: EpisodeResult) -> Bool[np.ndarray, " time"]:
     return episode.missed() <= tolerance(episode.active_family[-1])

@@ -8,8 +8,9 @@ import numpy as np
 from rich.table import Table
 
 from rebody.evaluation.changes import base_task_right
+from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.evaluate import POINT_MASS, Trial, evaluate, take_yardsticks
-from rebody.evaluation.results import EpisodeResult, Results
+from rebody.evaluation.results import Results
 from rebody.tasks import FAMILIES, Family, family_named
 from rebody.tasks.figures import LAST_S, tolerance
 from rebody.tasks.task_file import TaskSpec

@@ -6,7 +6,8 @@ from typing import Any
 import msgspec
 
 from rebody.errors import RebodyError
-from rebody.evaluation.results import VECTORS, VERSION, EpisodeResult, Results
+from rebody.evaluation.episode import VECTORS, EpisodeResult
+from rebody.evaluation.results import VERSION, Results
 from rebody.store.files import DATA, read_file
 from rebody.tasks import family_named
 

@@ -1,19 +1,17 @@
 """From episodes to the few numbers of a table."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rebody.evaluation.changes import base_task_right, summarise_changes
+from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.statistics import percentile_95, regret, share_of_oracle, with_interval
 from rebody.tasks.figures import tolerance
 
-if TYPE_CHECKING:
-    from rebody.evaluation.results import EpisodeResult
 
-
-def summarise(episodes: Sequence["EpisodeResult"]) -> dict[str, Any]:
+def summarise(episodes: Sequence[EpisodeResult]) -> dict[str, Any]:
     """Per family of the last task: statistics with 95 % intervals over tasks; beside them regret, falls and changes of
     all, and the same medians seed by seed.
     """
@@ -32,7 +30,7 @@ def summarise(episodes: Sequence["EpisodeResult"]) -> dict[str, Any]:
     }
 
 
-def _of_family(family: str, episodes: Sequence["EpisodeResult"]) -> dict[str, Any]:
+def _of_family(family: str, episodes: Sequence[EpisodeResult]) -> dict[str, Any]:
     errors, tasks = np.array([episode.final_error for episode in episodes]), [episode.task for episode in episodes]
     return {
         "episodes": len(episodes),
@@ -46,13 +44,13 @@ def _of_family(family: str, episodes: Sequence["EpisodeResult"]) -> dict[str, An
     }
 
 
-def _by_seed(episodes: Sequence["EpisodeResult"]) -> dict[str, float]:
+def _by_seed(episodes: Sequence[EpisodeResult]) -> dict[str, float]:
     """The median error of each evaluation seed: how much a start matters."""
     seeds = sorted({episode.seed for episode in episodes})
     return {str(seed): float(np.median([e.final_error for e in episodes if e.seed == seed])) for seed in seeds}
 
 
-def _regret(episodes: Sequence["EpisodeResult"]) -> dict[str, float] | None:
+def _regret(episodes: Sequence[EpisodeResult]) -> dict[str, float] | None:
     """(oracle return - return) / |oracle return|, each summed over episodes."""
     if any(episode.oracle_return is None for episode in episodes):
         return None
@@ -60,7 +58,7 @@ def _regret(episodes: Sequence["EpisodeResult"]) -> dict[str, float] | None:
     return with_interval(returns, regret, [episode.task for episode in episodes])
 
 
-def _share(episodes: Sequence["EpisodeResult"]) -> dict[str, float] | None:
+def _share(episodes: Sequence[EpisodeResult]) -> dict[str, float] | None:
     """(return - idle return) / (oracle return - idle return), each summed over episodes."""
     if any(episode.oracle_return is None or episode.idle_return is None for episode in episodes):
         return None

@@ -7,7 +7,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from rebody.evaluation.results import EpisodeResult, Results
+from rebody.evaluation.episode import EpisodeResult
+from rebody.evaluation.results import Results
 from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TASKS, TRUTH, as_text, figure
 from rebody.tasks import family_named
 

@@ -16,8 +16,8 @@ from jaxtyping import Float, UInt8
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.camera import Camera, Pole
 from rebody.errors import RebodyError
+from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.evaluate import Trial, evaluate
-from rebody.evaluation.results import EpisodeResult
 from rebody.report.figures import draw_progress
 from rebody.store.files import written_whole
 from rebody.tasks.task_file import TaskSpec

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from rich.table import Table
 from rich.text import Text
 
-from rebody.evaluation.results import EpisodeResult, Results
+from rebody.evaluation.episode import EpisodeResult
+from rebody.evaluation.results import Results
 from rebody.tasks import family_named
 
 
