@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agents import cell
-from rebody.agents.build import AGENTS
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, read_results, save_results
 from rebody.evaluation.evaluate import Trial
+from rebody.names import AGENTS
 from rebody.report.page import find, write_page
 from rebody.report.style import figure
 from rebody.store import load_artifact

@@ -1,6 +1,7 @@
 """What `rebody list` prints agrees with what it is about."""
 
 from rebody import names
+from rebody.agents.kinds import KINDS
 from rebody.evaluation.evaluate import POINT_MASS
 from rebody.report.thesis import FIGURES
 from rebody.store import load_artifact, shipped_artifacts
@@ -10,6 +11,10 @@ from rebody.training.inference import PRESETS
 
 def test_families():
     assert {family.name: f"{family.unit}, solved within {family.tolerance:g}" for family in FAMILIES} == names.FAMILIES
+
+
+def test_agents():
+    assert list(names.AGENTS) == list(KINDS)
 
 
 def test_presets():

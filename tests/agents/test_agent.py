@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from rebody.agents.agent import Observation
-from rebody.agents.build import AGENTS, build_agent
+from rebody.agents.build import build_agent
 from rebody.agents.clock import begin, decide
 from rebody.agents.configs import InferenceSettings
+from rebody.agents.kinds import KINDS
 from rebody.agents.parts import Inference, inference_template
 from rebody.bodies.toys import FullToy
 from rebody.control.high_level import PolicyView
@@ -204,7 +205,9 @@ def test_the_idle_agent_stands_still(inference, heard):
 
 
 def test_an_agent_that_there_is_not(inference):
-    with pytest.raises(RebodyError, match=f"unknown agent 'resue'. Agents are: {', '.join(AGENTS)}"):
+    with pytest.raises(
+        RebodyError, match=rf"unknown agent 'resue'\. Did you mean 'reuse'\? Agents are: {', '.join(KINDS)}"
+    ):
         build_agent("resue", inference)
 
 

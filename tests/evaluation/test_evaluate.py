@@ -8,14 +8,15 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-from rebody.agents.build import AGENTS, check_step_predictor
+from rebody.agents.build import check_step_predictor
 from rebody.agents.configs import InferenceSettings
+from rebody.agents.kinds import KINDS
 from rebody.agents.parts import LoadedStepPredictor, inference_template
 from rebody.bodies import load_robot
 from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results
-from rebody.evaluation.evaluate import POINT_MASS, ROBOT_AGENTS, run_trial, take_yardsticks, trial_agent
+from rebody.evaluation.evaluate import POINT_MASS, run_trial, take_yardsticks, trial_agent
 from rebody.inference.mixture.padded import no_mixture
 from rebody.store import tree_hash
 from rebody.store.typed import typed
@@ -111,7 +112,7 @@ def on_the_toy(trial, **changes):
     return replace(trial, robot=None, tracker=None, flat=None, **changes)
 
 
-@pytest.mark.parametrize("agent", [kind for kind in AGENTS if kind not in ROBOT_AGENTS])
+@pytest.mark.parametrize("agent", [name for name, kind in KINDS.items() if not kind.on_robots_alone])
 def test_point_mass(trial, agent):
     results = evaluate(on_the_toy(trial, agent=agent), SPECS, 1)
     assert (results.robot, results.agent, results.tracker, results.control_dt) == (POINT_MASS, agent, None, 0.1)

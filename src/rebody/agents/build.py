@@ -2,10 +2,9 @@
 
 from typing import Literal
 
-import jax.numpy as jnp
-
-from rebody.agents.agent import Agent, FlatAgent, IdleAgent, OracleAgent, ReadoutAgent, RetrainAgent, ReuseAgent
+from rebody.agents.agent import Agent
 from rebody.agents.fits import check_predictor, check_slots
+from rebody.agents.kinds import KINDS, Ingredients
 from rebody.agents.parts import (
     Inference,
     LoadedFlat,
@@ -20,9 +19,7 @@ from rebody.agents.slots import OneSlot, SlotChooser, SlotOfCluster
 from rebody.bodies import RobotSpec
 from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import SLOTS
-from rebody.errors import RebodyError
-from rebody.inference.exact import exact_posterior, read_mode
-from rebody.names import AGENTS
+from rebody.errors import RebodyError, did_you_mean
 from rebody.store import tree_hash
 from rebody.tasks import FAMILIES
 from rebody.types import Task
@@ -35,8 +32,8 @@ SlotsBy = Literal["classifier", "clusters"]
 
 def check_agent(kind: str) -> None:
     """RebodyError if there is no agent of that kind."""
-    if kind not in AGENTS:
-        raise RebodyError(f"unknown agent '{kind}'. Agents are: {', '.join(AGENTS)}.")
+    if kind not in KINDS:
+        raise RebodyError(f"unknown agent '{kind}'.{did_you_mean(kind, KINDS)} Agents are: {', '.join(KINDS)}.")
 
 
 def check_robot_of(
@@ -123,30 +120,4 @@ def build_agent(
     RebodyError if there is no such kind, or the module cannot serve it.
     """
     check_agent(kind)
-    parts, contract = inference.parts, inference.contract
-    listens = {"inferrer": parts.module.encoder, "reader": parts.probe, "stride": stride}
-    told = {"told_policy": parts.told_policy, "task_code": inference.task_code}
-    match kind:
-        case "reuse":
-            acts = {"interpret": parts.module.decoder.interpret, "high_level": parts.high_level}
-            slots = slots or OneSlot(contract.families[0])
-            return ReuseAgent(**listens, **acts, toy=inference.toy, horizon=horizon, slots=slots)
-        case "retrain":
-            assert high_level is not None
-            return RetrainAgent(**listens, interpret=parts.module.decoder.interpret, policy=high_level)
-        case "readout":
-            return ReadoutAgent(**listens, **told)
-        case "bayes":
-            posterior = exact_posterior(contract.target_ranges, contract.reward)
-            return ReadoutAgent(inferrer=posterior, reader=read_mode, stride=stride, **told)
-        case "oracle":
-            assert tasks is not None
-            active = Task(jnp.asarray(tasks.family), jnp.asarray(tasks.target))
-            return OracleAgent(**listens, **told, tasks=active)
-        case "flat":
-            return FlatAgent(**listens)
-        case "scratch":
-            assert scratch is not None
-            return FlatAgent(inferrer=scratch.module.encoder, reader=scratch.probe, stride=stride)
-        case _:
-            return IdleAgent(**listens, actions=inference.toy.actions)
+    return KINDS[kind].build(Ingredients(inference, tasks, slots, high_level, scratch, stride, horizon))

@@ -1,13 +1,12 @@
 """Options that all commands share which put an agent to the test."""
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
-from rebody.agents.build import AGENTS, HORIZON, SlotsBy, check_agent
+from rebody.agents.build import HORIZON, SlotsBy, check_agent
 from rebody.agents.parts import (
     LoadedFlat,
     LoadedHighLevel,
@@ -24,7 +23,8 @@ from rebody.agents.parts import (
 from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import POINT_MASS, Trial
-from rebody.ranges import Count, Decisions, Seconds
+from rebody.names import AGENTS
+from rebody.ranges import Count, Decisions, Seconds, check_ranges
 
 AGENT_HELP = "; ".join(f"{name}: {what}" for name, what in AGENTS.items())
 
@@ -64,12 +64,9 @@ class TrialOptions:
 
     def load(self) -> Trial:
         """Load the parts; RebodyError where an option makes no sense or a part cannot be had."""
+        check_ranges(self)
         check_agent(self.agent)
         stride = self._fixed_stride()
-        if stride < 1 or (self.horizon is not None and self.horizon < 1):
-            raise RebodyError(f"--{'stride' if stride < 1 else 'horizon'} must be at least 1.")
-        if not math.isfinite(self.seconds):
-            raise RebodyError(f"--seconds must be finite, not {self.seconds:g}.")
         robot = None if self.robot == POINT_MASS else load_robot(self.robot)
         inference = load_inference(self.inference)
         bridged = robot is not None and self.agent == "reuse"

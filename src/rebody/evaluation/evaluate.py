@@ -23,6 +23,7 @@ from rebody.agents.build import (
 from rebody.agents.clock import Clock, EvenClock, PredictedClock
 from rebody.agents.controller import Controller, FlatController, TrackerController
 from rebody.agents.fits import check_sizes
+from rebody.agents.kinds import KINDS
 from rebody.agents.parts import (
     Inference,
     LoadedFlat,
@@ -45,8 +46,6 @@ from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, Task
 
 POINT_MASS = "point-mass"
-THESIS_AGENTS = ("reuse", "retrain", "readout", "bayes")
-ROBOT_AGENTS = ("retrain", "flat", "scratch")
 MOST_DECISIONS = 1_000_000
 """Of all episodes of an evaluation together, 5,000 of 20 s: they are held in memory, and the slowest robot takes half
 an hour for them."""
@@ -257,13 +256,15 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
     check_agent(trial.agent)
     if trial.seconds < 3.0:
         raise RebodyError(f"--seconds {trial.seconds:g} is too short: final errors need the last 2 s of at least 3.")
-    if trial.thesis and trial.agent not in THESIS_AGENTS:
-        raise RebodyError(f"thesis mode is for the agents {', '.join(THESIS_AGENTS)}, not for '{trial.agent}'.")
+    kind = KINDS[trial.agent]
+    if trial.thesis and not kind.in_thesis_mode:
+        able = [name for name, other in KINDS.items() if other.in_thesis_mode]
+        raise RebodyError(f"thesis mode is for the agents {', '.join(able)}, not for '{trial.agent}'.")
     _check_tasks(trial, specs)
     if trial.robot is None:
         if trial.thesis and trial.stride > 1:
             raise RebodyError("in thesis mode a stride counts control steps of a robot; a point mass has none.")
-        if trial.agent in ROBOT_AGENTS:
+        if kind.on_robots_alone:
             raise RebodyError(f"agent '{trial.agent}' learned on a robot, and a point mass is none.")
         return
     slots = trial.tracker.tracker.slots if trial.tracker else slots_of(trial.robot.reach)

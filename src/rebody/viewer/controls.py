@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import viser
 
-from rebody.agents.build import AGENTS
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import Trial
 from rebody.inputs import number
+from rebody.names import AGENTS
 from rebody.tasks import FAMILIES, family_named, family_names
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image
 
-from rebody.agents.build import AGENTS
+from rebody.names import AGENTS
 from rebody.tasks import FAMILIES, family_named
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import colours

@@ -1,0 +1,108 @@
+"""The kinds of agents: a new one is an entry here, and a line about it in `rebody.names`."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import jax.numpy as jnp
+
+from rebody.agents.agent import Agent, FlatAgent, IdleAgent, OracleAgent, ReadoutAgent, RetrainAgent, ReuseAgent
+from rebody.agents.parts import Inference, ScratchParts
+from rebody.agents.slots import OneSlot, SlotChooser
+from rebody.control.slot_policy import SlotPolicy
+from rebody.inference.exact import exact_posterior, read_mode
+from rebody.types import Task
+
+
+@dataclass(frozen=True)
+class Ingredients:
+    """What agents are made of; each kind takes what it needs."""
+
+    inference: Inference
+    tasks: Task | None
+    """The active ones, [time, episode]."""
+    slots: SlotChooser | None
+    high_level: SlotPolicy | None
+    scratch: ScratchParts | None
+    stride: int
+    horizon: int
+
+    @property
+    def listening(self) -> dict[str, Any]:
+        """Of an agent whose belief is the frozen module's."""
+        parts = self.inference.parts
+        return {"inferrer": parts.module.encoder, "reader": parts.probe, "stride": self.stride}
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """Of an agent that takes a task for true."""
+        return {"told_policy": self.inference.parts.told_policy, "task_code": self.inference.task_code}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of agent."""
+
+    build: Callable[[Ingredients], Agent]
+    in_thesis_mode: bool = False
+    """Whether its module may tick once per stride (6.3.3)."""
+    on_robots_alone: bool = False
+    """Whether its policy learned on a robot, so that a point mass cannot have it."""
+
+
+def _reuse(of: Ingredients) -> Agent:
+    parts = of.inference.parts
+    return ReuseAgent(
+        **of.listening,
+        interpret=parts.module.decoder.interpret,
+        high_level=parts.high_level,
+        toy=of.inference.toy,
+        slots=of.slots or OneSlot(of.inference.contract.families[0]),  # a point mass has no slots: one stands for all
+        horizon=of.horizon,
+    )
+
+
+def _retrain(of: Ingredients) -> Agent:
+    assert of.high_level is not None
+    return RetrainAgent(**of.listening, interpret=of.inference.parts.module.decoder.interpret, policy=of.high_level)
+
+
+def _readout(of: Ingredients) -> Agent:
+    return ReadoutAgent(**of.listening, **of.told)
+
+
+def _bayes(of: Ingredients) -> Agent:
+    posterior = exact_posterior(of.inference.contract.target_ranges, of.inference.contract.reward)
+    return ReadoutAgent(inferrer=posterior, reader=read_mode, stride=of.stride, **of.told)
+
+
+def _oracle(of: Ingredients) -> Agent:
+    assert of.tasks is not None
+    active = Task(jnp.asarray(of.tasks.family), jnp.asarray(of.tasks.target))
+    return OracleAgent(**of.listening, **of.told, tasks=active)
+
+
+def _flat(of: Ingredients) -> Agent:
+    return FlatAgent(**of.listening)
+
+
+def _scratch(of: Ingredients) -> Agent:
+    assert of.scratch is not None
+    return FlatAgent(inferrer=of.scratch.module.encoder, reader=of.scratch.probe, stride=of.stride)
+
+
+def _idle(of: Ingredients) -> Agent:
+    return IdleAgent(**of.listening, actions=of.inference.toy.actions)
+
+
+KINDS = {
+    "reuse": Kind(_reuse, in_thesis_mode=True),
+    "retrain": Kind(_retrain, in_thesis_mode=True, on_robots_alone=True),
+    "readout": Kind(_readout, in_thesis_mode=True),
+    "bayes": Kind(_bayes, in_thesis_mode=True),
+    "oracle": Kind(_oracle),
+    "flat": Kind(_flat, on_robots_alone=True),
+    "scratch": Kind(_scratch, on_robots_alone=True),
+    "idle": Kind(_idle),
+}
+"""By name; `rebody.names.AGENTS` says what each is."""
