@@ -50,6 +50,19 @@ from rebody.training.tracker import report as tracker_report  # noqa: E402
 WINDOW, SECONDS = 6, 3.0
 JOINTS, ACTIONS = 17, 6  # of a cheetah
 
+MAPS = Path("/proc/self/maps")
+MOST_MAPS = 20_000
+"""Linux gives a process 65,530 memory maps, and crashes JAX's compiler where they run out. A compiled function takes
+several, and test modules hardly share any: what one has compiled is let go before too many pile up."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _few_memory_maps() -> Iterator[None]:
+    yield
+    if MAPS.exists() and MAPS.read_bytes().count(b"\n") > MOST_MAPS:
+        jax.clear_caches()
+
+
 # parts that nothing was learned for: enough to tell whether they are put together rightly
 
 

@@ -281,7 +281,9 @@ def test_a_diagnosis_and_own_artifacts_are_reported(trained, tasks, tmp_path, ca
     out, page = tmp_path / "diagnosis", tmp_path / "page.html"
     parts = ["--inference", str(trained["inference"]), "--tracker", str(trained["tracker"]), "--seconds", SECONDS]
     assert run(["diagnose", "--tasks", str(tasks), *parts, "--out", str(out)]) == 0
-    assert sorted(path.name for path in out.iterdir()) == ["bayes.json", "oracle.json", "readout.json", "reuse.json"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        f"{agent}.json" for agent in ("bayes", "idle", "oracle", "readout", "reuse")
+    ]
     runs = [str(trained["inference"]), str(trained["tracker"]), str(out), str(out / "reuse.json")]
     assert run(["report", *runs, "--out", str(page)]) == 0
     assert f"written: {page}" in capsys.readouterr().out

@@ -6,7 +6,7 @@ import pytest
 
 from rebody.agents.rollout import follow
 from rebody.bodies import load_robot
-from rebody.bodies.robot import RobotBatch
+from rebody.bodies import RobotBatch
 from rebody.cli.main import run
 from rebody.control.sac import Actor, SACConfig
 from rebody.control.tracker import Command, Tracker, tracker_observation

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rebody.errors import RebodyError
-from rebody.evaluation.diagnosis import LADDER
+from rebody.evaluation.diagnosis import IDLE, LADDER
 from rebody.report.page import find, write_page
 from rebody.report.page.page import readable
 from rebody.store import save_artifact, save_checkpoint
@@ -72,6 +72,9 @@ def test_nothing_comes_from_elsewhere(page, written):
     assert not re.search(r"@import|url\((?!#)", written.text)
 
 
+AGENTS = sorted([*LADDER, IDLE])
+
+
 def test_pictures_and_films_are_inside(page, written):
     for name, kind in (("episode.png", "image/png"), ("episode.mp4", "video/mp4")):
         content = base64.b64encode((written.demo / name).read_bytes()).decode()
@@ -81,17 +84,17 @@ def test_pictures_and_films_are_inside(page, written):
 def test_tables_have_the_numbers_with_their_intervals(page, written):
     by_agent = {agent: results.summary["families"]["goal"] for agent, results in written.results.items()}
     side_by_side = page.tables[0]
-    assert [cell.partition(":")[0] for cell in side_by_side[0][1:]] == [f"cheetah, {agent}" for agent in sorted(LADDER)]
+    assert [cell.partition(":")[0] for cell in side_by_side[0][1:]] == [f"cheetah, {agent}" for agent in AGENTS]
     row = next(row for row in side_by_side if row[0] == "goal: median error [m]")
-    for agent, cell in zip(sorted(LADDER), row[1:], strict=True):
+    for agent, cell in zip(AGENTS, row[1:], strict=True):
         value, low, high = (by_agent[agent]["median_error"][end] for end in ("value", "low", "high"))
         assert cell == f"{value:.3f} [{low:.3f}, {high:.3f}]"
 
 
 def test_every_episode_has_its_row(page, written):
     episodes = [table for table in page.tables if table[0][0] == "hidden task"]
-    assert [len(table) for table in episodes] == [1 + 2] * 4
-    reuse = episodes[sorted(LADDER).index("reuse")]
+    assert [len(table) for table in episodes] == [1 + 2] * len(AGENTS)
+    reuse = episodes[AGENTS.index("reuse")]
     assert [row[0] for row in reuse[1:]] == ["goal +2.5", "goal -1, from 1 s goal +1.5"]
     assert [row[3] for row in reuse[1:]] == [f"{e.final_error:.3f} m" for e in written.results["reuse"].episodes]
 

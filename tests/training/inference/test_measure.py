@@ -166,7 +166,8 @@ def clairvoyant(settings, monkeypatch):
         latent[: measure.BASE_TASK_AT - 1] *= -1  # it knows nothing before
         off = np.linspace(0.0, 0.3, held_out)
         fields = {
-            "x": np.where(tasks.family == GOAL, tasks.target + off, 0.1 * np.arange(TIME)[:, None] * tasks.target)
+            "x": np.where(tasks.family == GOAL, tasks.target + off, 0.1 * np.arange(TIME)[:, None] * tasks.target),
+            "vx": np.where(tasks.family == GOAL, 0.0, tasks.target),
         }
         paid = {"reuse": -2.0, "oracle": -1.0, "bayes": -1.5}[kind]
         return outcome_of(tasks, latent, reward=np.full(tasks.target.shape, paid, np.float32), **fields)
