@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from rebody.agents.rollout import follow
-from rebody.bodies import load_robot
-from rebody.bodies import RobotBatch
+from rebody.bodies import RobotBatch, load_robot
 from rebody.cli.main import run
 from rebody.control.sac import Actor, SACConfig
 from rebody.control.tracker import Command, Tracker, tracker_observation
