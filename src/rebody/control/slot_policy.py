@@ -16,7 +16,7 @@ from rebody.types import AnyArray, Belief, GlobalState, Subgoal
 Slots = tuple[tuple[int, float], ...]
 """Of each slot the family, and what a value of 1 asks for [m ahead of the robot, m/s, rad]."""
 SOFTNESS = 0.1
-"""While it learns, a slot is drawn by a softmax of |value| over this; afterwards the largest |value| has it."""
+"""While it learns, a slot is drawn by a softmax of |value| over this; at test time the argmax is used."""
 
 
 class SlotPolicy(eqx.Module):

@@ -42,8 +42,8 @@ class ScratchConfig:
     inference: InferenceConfig = field(default_factory=lambda: goal_velocity().inference)
     """Encoder, decoder and their loss: those of the toy's module."""
     reward: TrackerReward = field(default_factory=lambda: TrackerReward(relative=0.5, arrival=0.2))
-    """What the policy is paid: as a tracker that is told the hidden task. By relative errors: what a far goal costs by
-    its distance drowns all that a step is worth, as long as a goal is not told from another one."""
+    """What the policy is paid: as a tracker that is told the hidden task. By relative errors:
+    absolute errors of far goals dominate the return as long as goals are not told apart."""
     sac: SACConfig = field(default_factory=lambda: SACConfig(projections=8, decay_updates=195_000))
     """Hyperparameters of soft actor-critic."""
 

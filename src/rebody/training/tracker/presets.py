@@ -20,7 +20,7 @@ def tracker_preset(spec: RobotSpec) -> TrackerConfig:
     balancing = replace(
         sprawling,
         # told of a far goal by its distance alone, it learns to stand there; relative errors make it walk, unless
-        # staying alive pays more, or values grow large (a longer discount): then it never dares to
+        # staying alive pays more, or values grow large (a longer discount): it then fails to explore walking
         reward=TrackerReward(relative=0.5, arrival=0.2, alive=0.1),
     )
     if not spec.smoothing_s:
