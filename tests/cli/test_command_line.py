@@ -93,6 +93,8 @@ def test_run_draws_an_episode(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (["report", "."], "holds nothing to report"),
         (["report", "position", "--out", "page.json"], "must end with .html"),
         (["train", "inference", "--preset", "positions", "--out", "x"], "Presets are: position"),
+        (["train", "inference", "--preset", "", "--out", "x"], "unknown preset ''"),
+        (["stress", "--robot", "cheetah", "--tracker", ""], "not a complete artifact"),  # '' is this folder
         (["train", "tracker", "--robot", "hoper", "--out", "x"], "Did you mean 'hopper'"),
         (["robot", "check", "hoper"], "Robots are: cheetah, hopper, walker, or the path of a robot's TOML file"),
         (["robot", "check", "none.toml"], "cannot read the robot's file 'none.toml'"),

@@ -60,7 +60,7 @@ def test_what_was_edited_is_refused(spoil, says, path):
     assert str(path) in str(refused.value)
 
 
-@pytest.mark.parametrize("content", ["", "[1, 2]", '{"version": 1}', "not JSON"])
+@pytest.mark.parametrize("content", ["", "[1, 2]", '{"version": 1}', "not JSON", "[" * 100_000 + "]" * 100_000])
 def test_other_files_hold_no_results(content, path):
     assert holds_results(path)
     path.write_text(content)

@@ -199,5 +199,5 @@ def load_agent(
     """
     spec, module = load_robot(robot), load_inference(inference)
     slots = load_slots_of(module, classifier)
-    tracked = load_tracker(tracker or f"tracker-{spec.name}")
+    tracked = load_tracker(f"tracker-{spec.name}" if tracker is None else tracker)
     return LiveAgent(spec, module, tracked, slots, horizon, on_bad_input)

@@ -266,7 +266,7 @@ def load_slots_of(inference: Inference, reference: str | None) -> LoadedSlots | 
     """The named classifier, else the shipped one of a module that needs one; RebodyError if it cannot be had."""
     if reference is None and len(inference.contract.families) == 1:
         return None
-    return load_slots(reference or f"classifier-{inference.name}")
+    return load_slots(f"classifier-{inference.name}" if reference is None else reference)
 
 
 def task_code(target_ranges: Mapping[str, tuple[float, float]]) -> TaskCode:

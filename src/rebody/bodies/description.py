@@ -69,7 +69,7 @@ def _read(path: Path) -> RobotSpec:
         description = msgspec.convert(tomllib.loads(read_file(path, TEXT).decode("utf-8-sig")), _Description)
     except OSError as error:
         raise RebodyError(f"cannot read the robot's file '{path}': {error.strerror}.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise RebodyError(f"'{path}' is not a TOML file: {error}.") from error
     except msgspec.ValidationError as error:
         raise RebodyError(f"'{path}' does not describe a robot: {error}. See docs/own-robot.md.") from error

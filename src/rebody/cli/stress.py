@@ -27,7 +27,7 @@ class Stress:
     def run(self) -> None:
         """Run them all at once, print what share fell."""
         spec = load_robot(self.robot)
-        loaded = load_tracker(self.tracker or f"tracker-{spec.name}")
+        loaded = load_tracker(f"tracker-{spec.name}" if self.tracker is None else self.tracker)
         check_robot_of(loaded, spec)
         console = Console()
         with console.status(f"{self.episodes} episodes of {SECONDS:g} s"):

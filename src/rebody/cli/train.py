@@ -221,7 +221,8 @@ def train_command(arguments: list[str]) -> type:
 
     RebodyError if there is no such preset or robot.
     """
-    preset = _wanted("--preset", arguments) or TrainInference.preset
+    preset = _wanted("--preset", arguments)
+    preset = TrainInference.preset if preset is None else preset
     if preset not in PRESETS:
         raise RebodyError(f"unknown preset '{preset}'. Presets are: {', '.join(PRESETS)}.")
     default = TrainInference(config=PRESETS[preset](), preset=preset)

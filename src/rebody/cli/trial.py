@@ -74,7 +74,7 @@ class TrialOptions:
             agent=self.agent,
             robot=robot,
             inference=inference,
-            tracker=load_tracker(self.tracker or f"tracker-{robot.name}") if robot else None,
+            tracker=load_tracker(f"tracker-{robot.name}" if self.tracker is None else self.tracker) if robot else None,
             flat=self._flat(robot),
             scratch=self._scratch(robot),
             high_level=self._high_level(robot),
@@ -100,19 +100,23 @@ class TrialOptions:
     def _flat(self, robot: RobotSpec | None) -> LoadedFlat | None:
         if robot is None or self.agent != "flat":
             return None
-        return load_flat(self.flat or f"flat-{Path(self.inference).name}-{robot.name}")
+        return load_flat(f"flat-{Path(self.inference).name}-{robot.name}" if self.flat is None else self.flat)
 
     def _scratch(self, robot: RobotSpec | None) -> LoadedScratch | None:
         if robot is None or self.agent != "scratch":
             return None
-        return load_scratch(self.scratch or f"scratch-{robot.name}")
+        return load_scratch(f"scratch-{robot.name}" if self.scratch is None else self.scratch)
 
     def _high_level(self, robot: RobotSpec | None) -> LoadedHighLevel | None:
         if robot is None or self.agent != "retrain":
             return None
-        return load_high_level(self.high_level or f"high-level-{Path(self.inference).name}-{robot.name}")
+        return load_high_level(
+            f"high-level-{Path(self.inference).name}-{robot.name}" if self.high_level is None else self.high_level
+        )
 
     def _step_predictor(self, robot: RobotSpec | None) -> LoadedStepPredictor | None:
         if robot is None or self.stride != "predicted":
             return None
-        return load_step_predictor(self.step_predictor or f"step-predictor-{robot.name}")
+        return load_step_predictor(
+            f"step-predictor-{robot.name}" if self.step_predictor is None else self.step_predictor
+        )

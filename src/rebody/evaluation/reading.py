@@ -46,7 +46,7 @@ def holds_results(path: Path, inside: Path | None = None) -> bool:
 def _content(path: Path, data: bytes) -> Any:
     try:
         return msgspec.json.decode(data)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, RecursionError) as error:  # deep nesting, too
         raise RebodyError(f"{path} is not a JSON file ({error}): {WANTED}.") from None
 
 

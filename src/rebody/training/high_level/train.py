@@ -74,7 +74,7 @@ def train_high_level(
     check_ranges(config)
     spec, module = load_robot(robot), load_inference(inference)
     require_ready(spec)
-    loaded = load_tracker(tracker or f"tracker-{spec.name}")
+    loaded = load_tracker(f"tracker-{spec.name}" if tracker is None else tracker)
     check_robot_of(loaded, spec)
     module.contract.check_body(spec.name, spec.moving_fields, loaded.tracker.slots)
     settings = {"robot": robot, "inference": inference, "tracker": tracker, "seed": seed, "init_from": init_from}

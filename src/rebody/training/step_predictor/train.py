@@ -65,7 +65,7 @@ def train_step_predictor(
         raise RebodyError(f"--steps must be at least {MOST_STEPS}: so long can a subgoal be held.")
     spec = load_robot(robot)
     require_ready(spec)
-    loaded = load_tracker(tracker or f"tracker-{spec.name}")
+    loaded = load_tracker(f"tracker-{spec.name}" if tracker is None else tracker)
     check_robot_of(loaded, spec)
     settings = {"robot": robot, "tracker": tracker, "seed": seed, "init_from": init_from}
     with Run(out, asdict(config) | settings, resume=resume, finish=finish) as run:
