@@ -87,6 +87,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=Path("runs/kills"), help="a folder that is not there yet")
     arguments = parser.parse_args()
+    arguments.out = arguments.out.resolve()  # files are told by where they are
     arguments.out.mkdir(parents=True)
     for module, values in SHORT:
         for name, value in values.items():
