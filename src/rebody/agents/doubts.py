@@ -7,7 +7,7 @@ import numpy as np
 
 from rebody.inference.contract import Contract
 from rebody.tasks import FAMILIES
-from rebody.tasks.bounds import payable
+from rebody.tasks.bounds import ANY, payable
 from rebody.types import DECISION_DT, GlobalState
 
 SLACK, TOLERANCE = 1.25, 0.01
@@ -55,7 +55,7 @@ class RewardWatch:
         self._decisions += 1
         moved = {family.name: _moved(family.quantity.name, previous, state) for family in self._families}
         self._count_same(reward, all(before != after for before, after in moved.values()))
-        bounds = self._bounds(moved)
+        bounds = self._bounds(moved, {})
         if _is_beyond(reward, bounds):
             self._impossible.add(self._decisions, reward, bounds)
             return False
@@ -106,10 +106,10 @@ class RewardWatch:
         self._same = self._same + 1 if is_same and has_moved else 1
         self._last_reward = reward
 
-    def _bounds(self, moved: dict[str, tuple[float, float]], ranges: dict[str, tuple[float, float]] | None = None):
-        """Over all families; by any target where there are no ranges."""
+    def _bounds(self, moved: dict[str, tuple[float, float]], ranges: dict[str, tuple[float, float]]):
+        """Over all families, by the targets of their ranges; by any target of a family that has none there."""
         of_each = [
-            payable(family, self._contract.reward, moved[family.name], *([ranges[family.name]] if ranges else []))
+            payable(family, self._contract.reward, moved[family.name], ranges.get(family.name, ANY))
             for family in self._families
         ]
         return min(worst for worst, _ in of_each), max(best for _, best in of_each)

@@ -18,16 +18,15 @@ from rebody.inference.encoder import Encoder
 
 def check_sizes(part: LoadedTracker | LoadedFlat | LoadedScratch | LoadedHighLevel, spec: RobotSpec, module: Encoder):
     """RebodyError where a policy does not see what the robot and the module's beliefs give, or moves other joints."""
-    joints = spec.tracker_inputs - (spec.smoothing_s > 0)
     match part:
         case LoadedTracker(tracker=tracker):
             _check_actor(part.name, tracker.actor, tracker.actor.observations, spec.model.nu)
         case LoadedFlat(policy=policy):
             _check_places(part.name, policy.view.places, module)
-            _check_actor(part.name, policy.actor, policy.view.size(joints, module.latent), spec.model.nu)
+            _check_actor(part.name, policy.actor, policy.view.size(spec.joint_inputs, module.latent), spec.model.nu)
         case LoadedScratch(parts=parts):
             own = parts.module.encoder.latent
-            _check_actor(part.name, parts.policy.actor, parts.policy.view.size(joints, own), spec.model.nu)
+            _check_actor(part.name, parts.policy.actor, parts.policy.view.size(spec.joint_inputs, own), spec.model.nu)
         case LoadedHighLevel(policy=policy):
             _check_places(part.name, policy.view.places, module)
             _check_actor(part.name, policy.actor, policy.view.size(module.latent), len(policy.slots))

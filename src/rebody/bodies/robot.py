@@ -165,9 +165,14 @@ class RobotSpec:
         )  # fmt: skip
 
     @property
+    def joint_inputs(self) -> int:
+        """How many numbers the joint state has."""
+        return self.model.nq - 1 + self.model.nv
+
+    @property
     def tracker_inputs(self) -> int:
         """How many numbers a tracker sees of the body."""
-        return self.model.nq - 1 + self.model.nv + (self.smoothing_s > 0)
+        return self.joint_inputs + (self.smoothing_s > 0)
 
     def next_pace(self, pace: Floats, moved: Floats) -> Floats:
         """The pace [m/s] after a control step by `moved` [m]."""

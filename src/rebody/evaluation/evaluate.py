@@ -115,12 +115,11 @@ class Yardsticks:
     @property
     def returns(self) -> dict[str, Float[np.ndarray, " episode"] | None]:
         """Of each, by its name."""
-        each = {"oracle": self.oracle, "idle": self.idle}
-        return {name: None if e is None else np.asarray(e.reward).sum(axis=0) for name, e in each.items()}
+        return {name: None if e is None else np.asarray(e.reward).sum(axis=0) for name, e in vars(self).items()}
 
     def of(self, trial: Trial) -> Episodes | None:
         """Those of a trial whose agent is one of the two, unless it is to be filmed."""
-        return {"oracle": self.oracle, "idle": self.idle}.get(trial.agent) if trial.on_frame is None else None
+        return vars(self).get(trial.agent) if trial.on_frame is None else None
 
 
 @own_jax_settings()

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from rebody.evaluation.logs.file import COLUMNS, Log
+from rebody.evaluation.logs.origin import farthest_asked
 from rebody.evaluation.logs.resample import Decisions, mean_logged
 from rebody.inference.contract import Contract
 from rebody.tasks import FAMILIES
@@ -52,11 +53,7 @@ def _values_out_of_range(decisions: Decisions, contract: Contract) -> list[str]:
 
 def _limits(contract: Contract) -> dict[str, float]:
     """The farthest that tasks of the training led each field, either way [m, m/s, rad]."""
-    asked = {
-        family.quantity.name: max(abs(end) for end in contract.target_ranges[family.name])
-        for family in FAMILIES
-        if family.name in contract.target_ranges
-    }
+    asked = farthest_asked(contract)
     led = {RATE_OF[field]: EPISODE_S * speed for field, speed in asked.items() if field in RATE_OF}
     return asked | {field: asked.get(field, 0.0) + far for field, far in led.items()}
 

@@ -16,7 +16,8 @@ def begun_at_zero(log: Log, contract: Contract) -> Log:
     """The log with positions that begin farther from 0 than any goal of the training counted from the first row."""
     fields, notes = dict(log.fields), list(log.notes)
     for field in HORIZONTAL:
-        if field not in fields or abs(start := float(fields[field][0])) <= (farthest := _farthest(field, contract)):
+        farthest = farthest_asked(contract).get(field, FARTHEST_M)
+        if field not in fields or abs(start := float(fields[field][0])) <= farthest:
             continue
         fields[field] = fields[field] - start
         notes.append(
@@ -26,7 +27,10 @@ def begun_at_zero(log: Log, contract: Contract) -> Log:
     return replace(log, fields=fields, notes=tuple(notes))
 
 
-def _farthest(field: str, contract: Contract) -> float:
-    """Goal of the training [m]."""
-    learned = [contract.target_ranges.get(family.name, ()) for family in FAMILIES if family.quantity.name == field]
-    return max((abs(end) for ends in learned for end in ends), default=FARTHEST_M)
+def farthest_asked(contract: Contract) -> dict[str, float]:
+    """The largest target of the training, either way, of each quantity that tasks were about [m, m/s, rad]."""
+    return {
+        family.quantity.name: max(abs(end) for end in contract.target_ranges[family.name])
+        for family in FAMILIES
+        if family.name in contract.target_ranges
+    }
