@@ -4,7 +4,7 @@ All are pytrees of arrays with any leading batch shape, so they pass through
 `jit`, `vmap` and `scan`, and hold JAX or NumPy arrays alike.
 """
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
@@ -17,14 +17,18 @@ DECISION_DT = 0.1
 AnyArray = jax.Array | np.ndarray
 Tree = TypeVar("Tree")
 
-GLOBAL_FIELDS = ("x", "y", "z", "pitch", "vx", "vy", "vz", "pitch_rate")
-RATE_OF = {"vx": "x", "vy": "y", "vz": "z", "pitch_rate": "pitch"}
+POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
+RATE_FIELDS = ("vx", "vy", "vz", "roll_rate", "pitch_rate", "yaw_rate")
+GLOBAL_FIELDS = POSE_FIELDS + RATE_FIELDS
+ANGLES = ("roll", "pitch", "yaw")
+RATE_OF: dict[str, str] = dict(zip(RATE_FIELDS, POSE_FIELDS, strict=True))
 """Fields that are displacements over a decision, and what is displaced."""
 
 
 class GlobalState(eqx.Module):
     """The body-neutral readout of any body, relative to its rest pose.
 
+    The attitude is that of a turn by yaw (about z), then by pitch (about the new y), then by roll (about the new x).
     Velocities are displacements over the last decision divided by its 0.1 s,
     so they mean the same on a point mass and on a robot.
     """
@@ -32,16 +36,27 @@ class GlobalState(eqx.Module):
     x: Float[AnyArray, "*batch"]  # m, forward
     y: Float[AnyArray, "*batch"]  # m, left
     z: Float[AnyArray, "*batch"]  # m, up
+    roll: Float[AnyArray, "*batch"]  # rad, in (-pi, pi]
     pitch: Float[AnyArray, "*batch"]  # rad, in (-pi, pi]
+    yaw: Float[AnyArray, "*batch"]  # rad, in (-pi, pi], the heading
     vx: Float[AnyArray, "*batch"]  # m/s
     vy: Float[AnyArray, "*batch"]  # m/s
     vz: Float[AnyArray, "*batch"]  # m/s
+    roll_rate: Float[AnyArray, "*batch"]  # rad/s
     pitch_rate: Float[AnyArray, "*batch"]  # rad/s
+    yaw_rate: Float[AnyArray, "*batch"]  # rad/s
 
     def select(self, fields: tuple[str, ...]) -> Float[AnyArray, "*batch field"]:
         """The named fields, stacked on a last axis; of NumPy where they are."""
         chosen = [getattr(self, name) for name in fields]
         return (np if isinstance(chosen[0], np.ndarray) else jax.numpy).stack(chosen, axis=-1)
+
+
+def global_state(**fields: Float[AnyArray, "*batch"]) -> GlobalState:
+    """A global state of which only these fields, all of one shape, are not zero."""
+    some = next(iter(fields.values()))
+    still: Any = (np if isinstance(some, np.ndarray) else jax.numpy).zeros_like(some)
+    return GlobalState(**{name: fields[name] if name in fields else still for name in GLOBAL_FIELDS})
 
 
 class Task(eqx.Module):

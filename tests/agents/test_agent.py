@@ -20,7 +20,7 @@ from rebody.errors import RebodyError
 from rebody.inference.probe import fit_probe
 from rebody.store.typed import typed
 from rebody.tasks import GOAL, STAND, VELOCITY
-from rebody.types import Belief, GlobalState, Task, Transition
+from rebody.types import Belief, Task, Transition, global_state
 
 SIZE, DECISIONS = 3, 8
 
@@ -29,7 +29,7 @@ def state_of(x, vx):
     """A robot there [m] at that speed [m/s], its other fields anything."""
     x, vx = np.asarray(x, np.float32), np.asarray(vx, np.float32)
     other = np.full_like(x, 0.7)
-    return GlobalState(x, other, other, other, vx, other, other, other)
+    return global_state(x=x, y=other, z=other, pitch=other, vx=vx, vy=other, vz=other, pitch_rate=other)
 
 
 STATE = state_of([1.0, -4.0, 0.0], [2.0, 0.0, -1.0])

@@ -7,7 +7,7 @@ import pytest
 
 import rebody
 from rebody.agents.doubts import RewardWatch
-from rebody.types import GlobalState
+from rebody.types import global_state
 
 
 def run_towards(target: float, speed: float = 1.5, decisions: int = 60):
@@ -20,7 +20,7 @@ def run_towards(target: float, speed: float = 1.5, decisions: int = 60):
 
 
 def states(x, vx):
-    return [GlobalState(*(np.asarray(v, np.float32) for v in (a, 0, 0, 0, b, 0, 0, 0))) for a, b in zip(x, vx)]  # noqa: B905
+    return [global_state(x=np.asarray(a, np.float32), vx=np.asarray(b, np.float32)) for a, b in zip(x, vx)]  # noqa: B905
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from rebody.bodies.robot import Fall, RobotSpec
 from rebody.errors import RebodyError
 from rebody.store import tree_hash
 from rebody.tasks import GOAL, reward
-from rebody.types import Belief, GlobalState, Task, Transition
+from rebody.types import Belief, Task, Transition, global_state
 
 WINDOW = 6
 SEEDS = np.array([7, 8, 9])
@@ -273,7 +273,7 @@ def test_pitch_and_height_do_not_reach_the_belief(agent):
     still = np.zeros_like(x)
 
     def belief(other):
-        state = GlobalState(x, still, other, other, still, still, other, other)
+        state = global_state(x=x, z=other, pitch=other, vz=other, pitch_rate=other)
         carry, _ = begin(agent, jax.tree.map(lambda leaf: leaf[0], state))
         for i in range(1, WINDOW + 1):
             now = jax.tree.map(lambda leaf, i=i: leaf[i], state)

@@ -17,7 +17,7 @@ from rebody.inference.mixture.padded import no_mixture
 from rebody.nn import MLP
 from rebody.store import tree_hash
 from rebody.tasks import GOAL, STAND, VELOCITY, achieved
-from rebody.types import Belief, GlobalState
+from rebody.types import Belief, global_state
 
 LATENT = 5
 
@@ -86,7 +86,7 @@ def test_a_subgoal_goes_to_the_slot_of_its_belief(module, classifier):
     mean[:, 1] = (-5.0, 5.0)
     belief = Belief(mean, np.ones_like(mean))
     still = np.zeros(2, np.float32)
-    state = GlobalState(still, still, still, still, still + 0.5, still, still, still)
+    state = global_state(vx=still + 0.5)
     command = agent.command(state, belief, jnp.zeros((), jnp.int32))
     np.testing.assert_array_equal(command.subgoal.slot, [VELOCITY, STAND])
     ahead = jax.tree.map(lambda leaf: leaf[-1], agent.imagine(state, belief))

@@ -7,7 +7,7 @@ from rebody.agents.parts import task_code
 from rebody.control.flat import FlatView
 from rebody.control.high_level import PolicyView, TaskCode
 from rebody.tasks import GOAL, VELOCITY
-from rebody.types import Belief, GlobalState, Task
+from rebody.types import GLOBAL_FIELDS, Belief, GlobalState, Task, global_state
 
 CODE = TaskCode(((GOAL, 10.0), (VELOCITY, 3.0)))
 BELIEF = Belief(np.array([0.5, -1.0], np.float32), np.array([0.25, 4.0], np.float32))
@@ -34,13 +34,13 @@ def test_targets_are_divided_by_the_largest_of_their_family():
 
 
 def test_a_policy_sees_scaled_fields_then_mean_and_deviation():
-    state = GlobalState(*(np.asarray(i, np.float32) for i in range(8)))
-    np.testing.assert_allclose(PolicyView(("vx", "x"), (2.0, 7.0))(state, BELIEF), [2.0, 0.0, 0.5, -1.0, 0.5, 2.0])
+    state = GlobalState(**{name: np.asarray(i, np.float32) for i, name in enumerate(GLOBAL_FIELDS)})
+    np.testing.assert_allclose(PolicyView(("vx", "x"), (2.0, 7.0))(state, BELIEF), [3.0, 0.0, 0.5, -1.0, 0.5, 2.0])
 
 
 def test_places_are_seen_from_where_the_body_is():
     """Two fields, the second likelier: its place as it is, the first's faded by how much less likely it is."""
-    state = GlobalState(*(np.asarray(value, np.float32) for value in (6.0, 0, 0, 0, -1.0, 0, 0, 0)))
+    state = global_state(x=np.asarray(6.0, np.float32), vx=np.asarray(-1.0, np.float32))
     belief = Belief(np.array([0.2, 0.8, -0.4, 0.5], "f4"), np.array([0.0, 0.0, 0.04, 0.01], "f4"))
     view = PolicyView(("vx",), (2.0,), (("x", 10.0), ("vx", 2.0)))
     seen = view(state, belief)
@@ -52,7 +52,7 @@ def test_places_are_seen_from_where_the_body_is():
 
 def test_far_from_home_and_near_it_are_the_same_and_farther_than_far_too():
     def seen(x, goal):
-        state = GlobalState(*(np.asarray(value, np.float32) for value in (x, 0, 0, 0, 1.0, 0, 0, 0)))
+        state = global_state(x=np.asarray(x, np.float32), vx=np.asarray(1.0, np.float32))
         told = CODE(Task(np.array(GOAL), np.asarray(goal, np.float32)))
         return np.asarray(PolicyView(("vx",), (3.0,), CODE.places)(state, told))
 

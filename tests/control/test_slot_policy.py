@@ -9,15 +9,14 @@ from rebody.bodies.robot import Reach
 from rebody.control.sac import Critics, SACBatch, SACConfig, initial_state, update_many
 from rebody.control.slot_policy import SOFTNESS, draw, judge, pool, slot_sac, slots_within, subgoal_of
 from rebody.tasks import GOAL, STAND, VELOCITY
-from rebody.types import GlobalState
+from rebody.types import global_state
 
 SLOTS = ((GOAL, 5.0), (VELOCITY, 2.0), (STAND, 1.0))
 VALUES = np.array([[0.3, -0.4, 0.1], [-0.9, 0.2, 0.8], [0.0, 0.0, 0.0]], np.float32)
 
 
 def at(x):
-    still = np.zeros_like(x)
-    return GlobalState(x, *[still] * 7)
+    return global_state(x=x)
 
 
 def test_the_largest_value_stays_with_its_sign():

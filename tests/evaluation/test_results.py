@@ -15,7 +15,7 @@ from rebody.evaluation import Results, save_results, summary_table
 from rebody.evaluation.results import episode_results
 from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
-from rebody.types import Belief, GlobalState, Subgoal
+from rebody.types import Belief, Subgoal, global_state
 
 HEAD = {
     "version", "robot", "agent", "inference", "decision_dt", "control_dt", "stride", "horizon", "thesis", "frozen",
@@ -110,7 +110,7 @@ def episodes():
     still = np.zeros_like(x)
     vx = np.broadcast_to(np.array([0.0, 1.5], np.float32), x.shape)
     vz = np.where(time == time[3], 2.0, np.where(time == time[20], -1.0, 0.0)).astype(np.float32) + still
-    state = GlobalState(x, still, still, still + 0.3, vx, still, vz, still)
+    state = global_state(x=x, pitch=still + 0.3, vx=vx, vz=vz)
     belief = Belief(np.stack([x, -x], axis=-1), np.ones((*x.shape, 2), np.float32))
     return Episodes(state, -np.abs(x - 5), belief, Subgoal(np.full(x.shape, GOAL), x + 1), np.array([False, True]))
 

@@ -13,7 +13,7 @@ from rebody.inference.exact import (
     read_mode,
 )
 from rebody.tasks import GOAL, VELOCITY, reward
-from rebody.types import GlobalState, Task, Transition
+from rebody.types import Task, Transition, global_state
 
 RANGES = {"goal": (-10.0, 10.0), "velocity": (-3.0, 3.0)}
 SPACING = 20.0 / (TARGETS - 1)
@@ -21,8 +21,7 @@ SPACING = 20.0 / (TARGETS - 1)
 
 def at(x, vx=0.0):
     x, vx = np.broadcast_arrays(np.float32(x), np.float32(vx))
-    still = np.zeros_like(x)
-    return GlobalState(x, still, still, still, vx, still, still, still)
+    return global_state(x=x, vx=vx)
 
 
 def transition(state, earned):

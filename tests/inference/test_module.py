@@ -15,15 +15,14 @@ from rebody.inference import InferenceConfig, InferenceModule
 from rebody.inference.decoder import Decoder, Prediction
 from rebody.inference.module import BASE_TASKS, FARTHEST_PLACE, Evidence, loss
 from rebody.inference.prior import SplitPrior, unit_gaussian
-from rebody.types import Belief, GlobalState, Transition
+from rebody.types import Belief, Transition, global_state
 
 CONFIG = InferenceConfig(window=6, units=32, batch_size=16, decoded=4)
 UPDATES = 400
 
 
 def states(x):
-    still = np.zeros_like(x)
-    return GlobalState(x, still, still, still, still, still, still, still)
+    return global_state(x=x)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rebody.tasks import FAMILIES, reward
 from rebody.tasks.bounds import payable
-from rebody.types import GlobalState, Task
+from rebody.types import GLOBAL_FIELDS, GlobalState, Task
 
 ENDS = st.floats(-20, 20)
 
@@ -15,7 +15,7 @@ ENDS = st.floats(-20, 20)
 def paid(family: int, targets, quantity, form):
     """Rewards of these targets, of a body whose every number is `quantity`."""
     everywhere = np.full(np.shape(targets), quantity, np.float32)
-    state = GlobalState(*(everywhere for _ in range(8)))
+    state = GlobalState(**dict.fromkeys(GLOBAL_FIELDS, everywhere))
     return np.asarray(reward(Task(np.full(np.shape(targets), family), np.asarray(targets, np.float32)), state, form))
 
 

@@ -5,12 +5,11 @@ import pytest
 
 from rebody.errors import RebodyError
 from rebody.tasks import GOAL, JUMP, STAND, VELOCITY, achieved_by_way_of, base_task, family_index, reward
-from rebody.types import GlobalState, Task
+from rebody.types import GLOBAL_FIELDS, GlobalState, Task, global_state
 
 
 def reward_of(family, target, x=0.0, vx=0.0, pitch=0.0, form="plain"):
-    zero = np.zeros(())
-    state = GlobalState(np.asarray(x), zero, zero, np.asarray(pitch), np.asarray(vx), zero, zero, zero)
+    state = global_state(x=np.asarray(x), pitch=np.asarray(pitch), vx=np.asarray(vx))
     return float(reward(Task(np.asarray(family), np.asarray(target)), state, form))
 
 
@@ -36,15 +35,15 @@ def test_reward_by_hand(family, target, state, plain, relative):
 
 
 def test_a_batch_holds_different_families():
-    two, zero = np.full(3, 2.0), np.zeros(3)
-    state = GlobalState(two, zero, zero, two / 2, zero, zero, zero, zero)
+    two = np.full(3, 2.0)
+    state = global_state(x=two, pitch=two / 2)
     task = Task(np.asarray([GOAL, VELOCITY, STAND]), two)
     np.testing.assert_allclose(reward(task, state, "plain"), [0.0, -2.0, -1.0])
 
 
 def test_a_jump_is_the_fastest_rise_on_the_way_all_else_the_last_state():
     series = np.array([[1.0, 5.0], [3.0, 9.0], [2.0, 7.0]], np.float32)  # [time, body]
-    states = GlobalState(*([series] * 8))
+    states = GlobalState(**dict.fromkeys(GLOBAL_FIELDS, series))
     np.testing.assert_array_equal(achieved_by_way_of(np.array([GOAL, JUMP]), states), [2.0, 9.0])
 
 

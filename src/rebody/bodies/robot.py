@@ -13,7 +13,7 @@ from rebody.bodies.control_step import steps_per_decision
 from rebody.bodies.model import PLANE_JOINTS, compile_model
 from rebody.errors import RebodyError
 from rebody.ranges import Finite, Positive
-from rebody.types import DECISION_DT, GlobalState
+from rebody.types import DECISION_DT, GlobalState, global_state
 
 Floats = Float[np.ndarray, "..."]
 
@@ -158,11 +158,8 @@ class RobotSpec:
         x, z, pitch = (qpos[..., i].astype(np.float32) for i in self.root_addresses)
         step = (qpos - previous_qpos) / DECISION_DT
         vx, vz, pitch_rate = (step[..., i].astype(np.float32) for i in self.root_addresses)
-        still = np.zeros_like(x)
-        return GlobalState(
-            x=x, y=still, z=np.asarray(z - np.float32(self._rest_z)), pitch=wrap_angle(pitch),
-            vx=vx, vy=still, vz=vz, pitch_rate=pitch_rate,
-        )  # fmt: skip
+        above_rest = np.asarray(z - np.float32(self._rest_z))
+        return global_state(x=x, z=above_rest, pitch=wrap_angle(pitch), vx=vx, vz=vz, pitch_rate=pitch_rate)
 
     @property
     def joint_inputs(self) -> int:

@@ -16,7 +16,7 @@ from jaxtyping import Float, PRNGKeyArray
 
 from rebody.errors import RebodyError
 from rebody.ranges import NotNegative, Positive
-from rebody.types import DECISION_DT, AnyArray, GlobalState
+from rebody.types import DECISION_DT, AnyArray, GlobalState, global_state
 
 
 class Disturbance(eqx.Module):
@@ -136,8 +136,9 @@ class Toy(eqx.Module):
 
     def observe(self, state: ToyState) -> GlobalState:
         """The global state; y never moves."""
-        still = jnp.zeros_like(state.x)
-        return GlobalState(state.x, still, state.z, state.pitch, state.vx, still, state.vz, state.pitch_rate)
+        return global_state(
+            x=state.x, z=state.z, pitch=state.pitch, vx=state.vx, vz=state.vz, pitch_rate=state.pitch_rate
+        )
 
     def from_global(self, state: GlobalState) -> ToyState:
         """The nominal toy in the place of any body: where imagination starts (thesis 5.6.2)."""

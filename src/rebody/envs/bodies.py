@@ -13,7 +13,7 @@ from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.toy_models import mass_damper_model
 from rebody.bodies.toys import MassDamper
 from rebody.jax_settings import own_jax_settings
-from rebody.types import GlobalState
+from rebody.types import GlobalState, global_state
 
 
 class Bodies(ABC):
@@ -91,8 +91,7 @@ class PointMasses(Bodies):
 
     def global_state(self) -> GlobalState:
         """The readout of every point mass."""
-        still = np.zeros_like(self._x)
-        return GlobalState(self._x, still, still, still, self._vx, still, still, still)
+        return global_state(x=self._x, vx=self._vx)
 
 
 @eqx.filter_jit

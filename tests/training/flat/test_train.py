@@ -10,7 +10,7 @@ from rebody.control.sac import SACConfig
 from rebody.store import tree_hash
 from rebody.training.flat import FlatConfig
 from rebody.training.flat.train import collect, initial_state, put_on_feet
-from rebody.types import GlobalState, Transition
+from rebody.types import Transition, global_state
 
 ROBOTS, STEPS, DECISIONS, TURNS = 3, 4, 5, 6
 EPISODE = 2 * DECISIONS  # control steps: no multiple of a turn's
@@ -83,9 +83,9 @@ def test_a_belief_changes_when_a_decision_ends_and_is_the_encoders(turns, infere
 
     last = slice(EPISODE + 1, 2 * EPISODE, 2)  # the second episode's decisions
     x = x[last].T
-    before, still = np.concatenate([np.zeros_like(x[:, :1]), x[:, :-1]], axis=1), np.zeros_like(x)
+    before = np.concatenate([np.zeros_like(x[:, :1]), x[:, :-1]], axis=1)
     earned = -np.abs(x - targets(minds)[EPISODE][:, None])
-    heard = Transition(GlobalState(before, *[still] * 7), earned, GlobalState(x, *[still] * 7))
+    heard = Transition(global_state(x=before), earned, global_state(x=x))
     beliefs = inference.parts.module.encoder.along(heard)
     features = np.concatenate([beliefs.mean, np.sqrt(beliefs.variance)], axis=-1)
     np.testing.assert_allclose(believed[last].swapaxes(0, 1), features, atol=1e-4)

@@ -13,7 +13,7 @@ from rebody.tasks import GOAL, VELOCITY
 from rebody.training.inference.clusters import agreement, draw, new_mixture, refit, sample_beliefs
 from rebody.training.inference.config import MixtureConfig
 from rebody.training.inference.episodes import Episodes
-from rebody.types import Belief, GlobalState, Task
+from rebody.types import Belief, Task, global_state
 
 CENTRES = np.array([[-4.0, 0.0], [4.0, 0.0], [0.0, 6.0]])
 
@@ -34,7 +34,7 @@ def episodes_at(centres, config, seed=0):
     task = Task(family[kind], target[kind])
     return Episodes(
         task=jax.tree.map(lambda leaf: jnp.broadcast_to(leaf[:, None], shape), task),
-        state=GlobalState(still, still, still, still, still, still, still, still),
+        state=global_state(x=still),
         belief=Belief(jnp.asarray(mean, jnp.float32), jnp.full(mean.shape, 0.03)),
         action=jnp.zeros((*shape, 1)),
         reward=jnp.zeros(shape),

@@ -18,7 +18,7 @@ from rebody.training.inference.train import tell
 from rebody.training.minds import Minds
 from rebody.training.scratch import ScratchConfig
 from rebody.training.scratch.train import collect, initial_state, sample_steps, understand
-from rebody.types import GlobalState, Task, Transition
+from rebody.types import Task, Transition, global_state
 
 ROBOTS, DECISIONS, GROUPS, START = 3, 5, 2, 15.0
 PER_DECISION, JOINTS = 2, 17
@@ -134,7 +134,7 @@ def test_who_is_told_goes_by_the_truth_in_the_terms_of_a_belief(config, state):
     four = replace(config, robots=4)
     task = Task(np.full(4, GOAL, np.int32), np.full(4, -5.0, np.float32))
     encoder = state.module.encoder
-    here = GlobalState(*[np.zeros(4, np.float32)] * 8)
+    here = global_state(x=np.zeros(4, np.float32))
     minds = Minds(encoder.initial((4,)), encoder.prior((4,)), here, task)
     gone_by = understand(state.module, minds, four)
     np.testing.assert_allclose(gone_by.mean[:2], [[1.0, 0.0, -0.5, 0.0]] * 2)

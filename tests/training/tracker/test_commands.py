@@ -10,7 +10,7 @@ from rebody.bodies.toys import MassDamper
 from rebody.control.tracker import MARGIN
 from rebody.tasks import GOAL, JUMP, STAND, VELOCITY, family_index, family_names
 from rebody.training.tracker.commands import CommandDistribution, ToyGuide, _scripted_action
-from rebody.types import GlobalState, Task
+from rebody.types import Task, global_state
 
 DRAWN = 40_000
 ROUGHLY = 0.01  # four standard deviations of a share
@@ -69,8 +69,7 @@ def test_speeds_are_uniform(drawn):
 
 def robots_at(x, vx):
     x, vx = np.asarray(x, np.float32), np.asarray(vx, np.float32)
-    still = np.zeros_like(x)
-    return GlobalState(x, still, still, still, vx, still, still, still)
+    return global_state(x=x, vx=vx)
 
 
 def test_a_guide_is_the_toy_stepped_as_often_as_it_is_ahead():

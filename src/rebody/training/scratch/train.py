@@ -35,7 +35,7 @@ from rebody.training.motion import told_reward
 from rebody.training.run import Metrics, Run
 from rebody.training.scratch.config import ScratchConfig
 from rebody.training.scratch.report import measure, save_scratch
-from rebody.types import AnyArray, Belief, GlobalState, Task
+from rebody.types import AnyArray, Belief, Task, global_state
 
 REFRESH_EVERY = 8
 """Iterations after which today's encoder goes along all stored episodes again."""
@@ -264,7 +264,7 @@ def _no_replay(config: ScratchConfig, batch: RobotBatch) -> Replay:
     return Replay(
         Episodes(
             Task(jnp.zeros(per_decision.shape, jnp.int32), per_decision),
-            GlobalState(*[between] * 8),
+            global_state(x=between),
             Belief(latent, latent),
             acted,
             per_decision,
