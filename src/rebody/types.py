@@ -55,8 +55,9 @@ class GlobalState(eqx.Module):
 def global_state(**fields: Float[AnyArray, "*batch"]) -> GlobalState:
     """A global state of which only these fields, all of one shape, are not zero."""
     some = next(iter(fields.values()))
-    still: Any = (np if isinstance(some, np.ndarray) else jax.numpy).zeros_like(some)
-    return GlobalState(**{name: fields[name] if name in fields else still for name in GLOBAL_FIELDS})
+    still = (np if isinstance(some, np.ndarray) else jax.numpy).zeros_like(some)
+    values: dict[str, Any] = dict.fromkeys(GLOBAL_FIELDS, still)
+    return GlobalState(**(values | fields))
 
 
 class Task(eqx.Module):
