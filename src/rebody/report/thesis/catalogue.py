@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from rebody import names
-from rebody.errors import RebodyError, did_you_mean
+from rebody.errors import RebodyError, unknown
 from rebody.report.thesis import balancing, retrained, zero_shot
 from rebody.report.thesis import first_experiment as first
 from rebody.report.thesis import several_families as several
@@ -223,8 +223,7 @@ def find_figures(numbers: Sequence[str]) -> list[ThesisFigure]:
         return list(FIGURES.values())
     for number in numbers:
         if number not in FIGURES:
-            guess = did_you_mean(number, FIGURES)
-            raise RebodyError(f"there is no figure '{number}'.{guess} Figures are: {', '.join(FIGURES)}, or all.")
+            raise unknown("figure", number, FIGURES, "or all")
     return [FIGURES[number] for number in dict.fromkeys(numbers)]
 
 
