@@ -35,4 +35,4 @@ def _tracker_env(**settings: Any) -> gymnasium.Env:
     return TrackerEnv(**settings)
 
 
-register_environments(_tracker_env)
+register_environments(tracker_env=f"{__name__}:{_tracker_env.__name__}")

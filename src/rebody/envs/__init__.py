@@ -1,6 +1,5 @@
 """Gymnasium environments that hide their task from the observation. Importing this is cheap."""
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -15,10 +14,11 @@ _ROBOTS = {"HalfCheetah": ("cheetah", 0.05), "Hopper": ("hopper", 0.02), "Walker
 _SECONDS, _DECISION_DT = 20.0, 0.1
 
 
-def register_environments(tracker_env: Callable[..., gymnasium.Env]) -> None:
+def register_environments(tracker_env: str) -> None:
     """Tell Gymnasium where `rebody/PointMass-v0`, `rebody/HalfCheetah-v0` ... are; they load when made.
 
-    `tracker_env` makes the learning problem of a robot's tracker, which is on a floor above this one.
+    `tracker_env` is what makes the learning problem of a robot's tracker, which is on a floor above this one:
+    MODULE:FUNCTION of the caller, since Gymnasium cannot serialise the specification of a function itself.
     """
     _register("PointMass", "PointMass", _DECISION_DT, {})
     for name, (robot, control_dt) in _ROBOTS.items():
