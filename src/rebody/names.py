@@ -75,7 +75,9 @@ def presets() -> dict[str, str]:
 
 def first_lines(source: Path) -> dict[str, str]:
     """First lines of the docstrings of a file's classes and functions, by name."""
-    documented = (node for node in ast.parse(source.read_text()).body if isinstance(node, ast.ClassDef | ast.FunctionDef))
+    documented = (
+        node for node in ast.parse(source.read_text()).body if isinstance(node, ast.ClassDef | ast.FunctionDef)
+    )
     return {node.name: (ast.get_docstring(node) or "").partition("\n")[0] for node in documented}
 
 

@@ -57,10 +57,7 @@ def union_of(arguments: Sequence[str]) -> Any:
     names = [command.name for command in COMMANDS]
     named = next((argument for argument in arguments if argument in names), None)
     return subcommands(
-        {
-            command.name: command.load(arguments) if command.name == named else command.stand_in()
-            for command in COMMANDS
-        }
+        {command.name: command.load(arguments) if command.name == named else command.stand_in() for command in COMMANDS}
     )
 
 

@@ -164,7 +164,9 @@ def train_command(arguments: Sequence[str]) -> type:
     if preset is not None and preset not in PRESETS:
         raise unknown("preset", preset, PRESETS)
     # a robot of the user's own is a subcommand, too: its path is the only argument that is read before tyro reads all
-    own = _word_behind("tracker", "ROBOT", robots | {"PATH": "The tracker of your own robot, by its TOML file."}, arguments)
+    own = _word_behind(
+        "tracker", "ROBOT", robots | {"PATH": "The tracker of your own robot, by its TOML file."}, arguments
+    )
     robots |= {} if own is None or own in robots else {own: "The tracker of your own robot."}
     of_preset = {name: TrainInference(name, preset()) for name, preset in PRESETS.items()}
     of_robot = {name: TrainTracker(name, tracker_preset(load_robot(name))) for name in robots}

@@ -151,13 +151,12 @@ def _draw(each: Panel, log: Log, axes: Axes) -> None:
         if there.any():
             style = "o-" if there.mean() < SPARSE or there.sum() == 1 else "-"
             points = iteration[there], log[column][there]
-            axes.plot(*points, style, ms=3.5, lw=1.3, color=next(colours), label=label)
+            said = None if label == each.axis else label
+            axes.plot(*points, style, ms=3.5, lw=1.3, color=next(colours), label=said)
     begin = min(0.0, iteration[0])
     axes.set(title=each.title, xlabel="iteration")
     axes.set(xlim=(begin, begin + 1.02 * (iteration[-1] - begin or 1.0)))
     axes.set(ylabel=each.axis, yscale=each.scale, ylim=each.limits)
-    if list(each.columns.values()) != [each.axis]:  # which says it already
-        axes.legend(frameon=False, fontsize=8)
 
 
 def _there(log: Log, column: str, scale: str) -> np.ndarray:
