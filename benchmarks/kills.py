@@ -45,7 +45,8 @@ TRAINERS = {
         --inference.window 4 --inference.batch-size 4 --inference.decoded 2 {SAC} --sac.projections 2 --prior mixture
         --mixture.from-iteration 1 --mixture.points 60""",
     "tracker": f"cheetah {ROBOTS} --steps 4 --updates 2 --replay 60 {SAC}",
-    "flat": f"{ON_CHEETAH} --inference position --steps 4 --updates 2 --replay 60 --decisions 5 {SAC} --sac.projections 0",
+    "flat": f"""{ON_CHEETAH} --inference position --steps 4 --updates 2 --replay 60 --decisions 5 {SAC}
+        --sac.projections 0""",
     "scratch": f"""{ON_CHEETAH} --decisions 6 --groups 2 --inference-updates 2 --policy-updates 2 --inference.units 8
         --inference.window 4 --inference.batch-size 4 --inference.decoded 2 {SAC} --sac.projections 0""",
     "high-level": f"{ON_CHEETAH} --steps 4 --updates 2 --replay 60 --decisions 5 {SAC} --sac.projections 0",

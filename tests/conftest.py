@@ -178,7 +178,8 @@ FLAGS = {
     """,
 }
 FULL = f"""
-    {FLAGS["inference"].replace("position", "goal-velocity-stand")} --switch-share 0.5 --mixture.from-iteration 1 --mixture.maximum 6
+    {FLAGS["inference"].replace("position", "goal-velocity-stand")}
+    --switch-share 0.5 --mixture.from-iteration 1 --mixture.maximum 6
     --inference.window None --inference.latent 5 --inference.kinds 2 --inference.label-weight 0.05
     --wander-iterations 1 --joint-iterations 2 --policy-iterations 1
 """

@@ -388,7 +388,7 @@ def test_a_system_that_refuses_to_write_is_one_message(evaluate, monkeypatch, tm
 
 
 def test_unknown_options_are_usage_errors(capsys):
-    for words in ("evaluate", "run --task goal=1 --colour red", "train tracker --out x", "fly"):
+    for words in ("evaluate", "run --task goal=1 --colour red", "train tracker hopper", "fly"):
         with pytest.raises(SystemExit) as stopped:
             run(words.split())
         assert stopped.value.code == 2

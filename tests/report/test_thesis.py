@@ -67,7 +67,10 @@ SYNTHETIC = {
     "6.9": join(STRIDES | {"ours": episodes_of(2)}),
     **dict.fromkeys(("6.10", "6.11"), join({"thesis": episodes_of(1), "ours": episodes_of(2)})),
     "6.12": join(
-        {f"tracker-{robot}": curves_of("reward", "falls_per_minute", measured_every=1) for robot in ("hopper", "walker")}
+        {
+            f"tracker-{robot}": curves_of("reward", "falls_per_minute", measured_every=1)
+            for robot in ("hopper", "walker")
+        }
     ),
     "6.13": curves_of(
         "return", "evaluation/return", "evaluation/oracle return", "evaluation/goal median",

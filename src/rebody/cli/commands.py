@@ -61,7 +61,7 @@ def union_of(arguments: Sequence[str]) -> Any:
     )
 
 
-def subcommands(kinds: Mapping[str, Any], lines: Mapping[str, str] = {}) -> Any:  # noqa: B006
+def subcommands(kinds: Mapping[str, Any], lines: Mapping[str, str] = {}) -> Any:
     """A type that tyro reads as one of these, by name: classes, or instances that say a class's defaults.
 
     `lines` say what a name stands for, in place of its class's docstring.

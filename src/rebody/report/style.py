@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -14,7 +15,7 @@ from matplotlib.figure import Figure
 from rebody.store.files import written_whole
 
 TRUTH, BELIEF, MOTION, ORACLE, IDLE = "#222222", "#d1495b", "#2b6f9e", "#8a8a8a", "#c9a227"
-LOOK = {
+LOOK: dict[Any, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "font.size": 10,
