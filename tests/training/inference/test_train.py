@@ -73,7 +73,7 @@ def test_evidence_is_a_window_and_transitions_of_the_same_episode(labelled, conf
     assert set(time[:, 0]) == set(range(config.decisions - length + 1))
     np.testing.assert_array_equal(window.reward, -window.previous.x)
     np.testing.assert_array_equal(window.state.x, window.previous.x + 1)
-    np.testing.assert_array_equal(window.state.vx, window.previous.x + 1 + 4 / 8)  # the fifth field
+    np.testing.assert_array_equal(window.state.vx, window.previous.x + 1 + 6 / 8)  # the seventh field
 
     of_group, of_episode, at = unpack(evidence.previous.x)
     decoded = np.zeros(config.inference.decoded, int)
@@ -102,7 +102,7 @@ def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, con
     assert set(group) == set(range(stored))
     assert set(episode) == set(range(config.episodes // 2))
     assert set(time) == set(range(config.decisions))
-    np.testing.assert_array_equal(vx, x + 4 / 8)
+    np.testing.assert_array_equal(vx, x + 6 / 8)
     for mean in belief[: config.inference.latent]:
         np.testing.assert_array_equal(mean, x + 0.5)
     for deviation in belief[config.inference.latent :]:
