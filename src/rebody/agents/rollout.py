@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from rebody.agents.agent import Agent, Observation
-from rebody.agents.clock import Clock, EvenClock, place
+from rebody.agents.clock import Clock, EvenClock
 from rebody.agents.controller import Controller
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.toys import Disturbance, Toy
-from rebody.tasks import RewardForm, reward
-from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task
+from rebody.tasks import FamilySet
+from rebody.types import AnyArray, Belief, GlobalState, Pose, Subgoal, Task
 
 Starts = Sequence[int] | Int[np.ndarray, " episode"]
 """What the reset noise of each episode is drawn from."""
@@ -34,10 +34,10 @@ class Episodes(eqx.Module):
 
 @eqx.filter_jit
 def rollout_on_toy(
-    agent: Agent, toy: Toy, tasks: Task, form: RewardForm, disturbance: Disturbance | None = None
+    agent: Agent, toy: Toy, tasks: Task, families: FamilySet, disturbance: Disturbance | None = None
 ) -> Episodes:
-    """Episodes on a toy from x = 0 at rest; `tasks` are the active ones, [time, episode]."""
-    still = jnp.zeros(tasks.target.shape[1])
+    """Episodes on a toy from x = 0 at rest; `tasks` are the active ones, [time, episode], of `families`."""
+    still = jnp.zeros(tasks.family.shape[1])
     body = toy.initial(still, still, disturbance)
     carry, command = agent.begin(toy.observe(body))
 
@@ -46,11 +46,11 @@ def rollout_on_toy(
         task, key = inputs
         body = toy.step(body, command.action, key)
         state = toy.observe(body)
-        earned = reward(task, state, form)
+        earned = families.reward(task, state)
         carry, following = agent.decide(carry, Observation(state, earned))
         return (body, carry, following), (state, earned, carry.belief, command.subgoal)
 
-    keys = jax.random.split(jax.random.key(0), len(tasks.target))
+    keys = jax.random.split(jax.random.key(0), len(tasks.family))
     _, (state, earned, belief, subgoal) = jax.lax.scan(advance, (body, carry, command), (tasks, keys))
     return Episodes(state, earned, belief, subgoal, still > 0)
 
@@ -60,7 +60,7 @@ def rollout_on_robot(
     controller: Controller,
     spec: RobotSpec,
     tasks: Task,
-    form: RewardForm,
+    families: FamilySet,
     starts: Starts,
     on_frame: OnFrame | None = None,
     clock: Clock | None = None,
@@ -72,7 +72,7 @@ def rollout_on_robot(
     The clock says when the agent decides (thesis mode, 6.3.3); default is every 0.1 s. What is returned stays 0.1 s
     apart.
     """
-    decisions, size = tasks.target.shape
+    decisions, size = tasks.family.shape
     per_decision = spec.steps_per_decision
     batch = RobotBatch(spec, size)
     for episode, seed in enumerate(starts):
@@ -95,7 +95,7 @@ def rollout_on_robot(
             continue
         state = spec.observe(batch.qpos, trail[0])
         i = (step - 1) // per_decision
-        earned = task_reward(Task(tasks.family[i], tasks.target[i]), state, form)
+        earned = task_reward(families, Task(tasks.family[i], tasks.target[i]), state)
         if due.any():
             carry, command = clock.decide(agent, carry, Observation(state, earned), due)
             steps_left = np.where(due, clock.steps(batch, command.subgoal), steps_left)
@@ -107,23 +107,23 @@ def rollout_on_robot(
 
 def follow(controller: Controller, batch: RobotBatch, subgoal: Subgoal, belief: Belief | None = None) -> None:
     """One control step of every robot."""
-    batch.step(np.asarray(joint_action(controller, controller.see(batch), *place(batch), subgoal, belief)))
+    pose = batch.spec.pose(batch.qpos)
+    batch.step(np.asarray(joint_action(controller, controller.see(batch), pose, subgoal, belief)))
 
 
 @eqx.filter_jit
 def joint_action(
     controller: Controller,
     joints: Float[AnyArray, "*episode joint"],
-    x: Float[AnyArray, "*episode"],
-    pitch: Float[AnyArray, "*episode"],
+    pose: Pose,
     subgoal: Subgoal,
     belief: Belief | None,
 ) -> Float[AnyArray, "*episode action"]:
-    """What the controller does with the joints of robots at x [m] and pitch [rad]."""
-    return controller(joints, x, pitch, subgoal, belief)
+    """What the controller does with the joints of robots in these poses."""
+    return controller(joints, pose, subgoal, belief)
 
 
 @eqx.filter_jit
-def task_reward(task: Task, state: GlobalState, form: RewardForm) -> Float[AnyArray, "*episode"]:
-    """`rebody.tasks.reward`, compiled."""
-    return reward(task, state, form)
+def task_reward(families: FamilySet, task: Task, state: GlobalState) -> Float[AnyArray, "*episode"]:
+    """`FamilySet.reward`, compiled."""
+    return families.reward(task, state)

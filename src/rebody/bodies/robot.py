@@ -12,8 +12,8 @@ from jaxtyping import Bool, Float, Int
 from rebody.bodies.control_step import steps_per_decision
 from rebody.bodies.model import PLANE_JOINTS, compile_model
 from rebody.errors import RebodyError
-from rebody.ranges import Finite, Positive
-from rebody.types import DECISION_DT, GlobalState, global_state
+from rebody.ranges import Box
+from rebody.types import DECISION_DT, POSE_FIELDS, GlobalState, global_state
 
 Floats = Float[np.ndarray, "..."]
 
@@ -33,36 +33,8 @@ class Fall:
     """Seconds without a break."""
 
 
-@dataclass(frozen=True)
-class Reach:
-    """What may be asked of a robot's tracker."""
-
-    speed: tuple[Finite, Finite]
-    """Fastest backward (negative) and forward [m/s]."""
-    distance: Positive = 5.0
-    """Farthest goal [m]; farther ones are cut to it."""
-    pitch: tuple[Finite, Finite] | None = None
-    """Pitches that it can stand at [rad]; None for a robot that is not asked to."""
-    jump: tuple[Finite, Finite] | None = None
-    """Vertical speeds that it can jump at [m/s]; None for a robot that is not asked to."""
-
-    @property
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Smallest and largest value of each slot that it has, by the family's name [m ahead, m/s, rad, m/s]."""
-        ends = {
-            "goal": (-self.distance, self.distance),
-            "velocity": self.speed,
-            "stand": self.pitch,
-            "jump": self.jump,
-        }
-        return {name: limits for name, limits in ends.items() if limits is not None}
-
-    def within(self, family: str, low: float, high: float) -> tuple[float, float]:
-        """What it reaches of a family's targets from `low` to `high`; goals may lie farther off than `distance`."""
-        if family == "goal" or family not in self.limits:
-            return low, high
-        lowest, highest = self.limits[family]
-        return max(low, lowest), min(high, highest)
+Reach = tuple[tuple[str, Box], ...]
+"""What may be asked of a robot's tracker: families by name, each with a range [m ahead, m/s, rad]."""
 
 
 @dataclass(frozen=True)
@@ -221,6 +193,13 @@ class RobotSpec:
     def pitch(self, qpos: Floats) -> Floats:
         """Pitch of the root body, in (-pi, pi] [rad]."""
         return wrap_angle(qpos[..., self.root_addresses[2]])
+
+    def pose(self, qpos: Floats) -> Float[np.ndarray, "... 6"]:
+        """The fields of `POSE_FIELDS` at this moment."""
+        x, z, _ = self.root_addresses
+        pose = np.zeros((*qpos.shape[:-1], len(POSE_FIELDS)), np.float32)
+        pose[..., 0], pose[..., 2], pose[..., 4] = qpos[..., x], qpos[..., z] - self._rest_z, self.pitch(qpos)
+        return pose
 
     def lies(self, qpos: Floats) -> Bool[np.ndarray, "..."]:
         """Whether each robot lies on the ground at this moment."""

@@ -24,6 +24,7 @@ from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import POINT_MASS, Trial
 from rebody.names import AGENTS
+from rebody.tasks import SHIPPED
 from rebody.ranges import Count, Decisions, Seconds, check_ranges
 
 AGENT_HELP = "; ".join(f"{name}: {what}" for name, what in AGENTS.items())
@@ -74,6 +75,7 @@ class TrialOptions:
             agent=self.agent,
             robot=robot,
             inference=inference,
+            families=SHIPPED,
             tracker=load_tracker(f"tracker-{robot.name}" if self.tracker is None else self.tracker) if robot else None,
             flat=self._flat(robot),
             scratch=self._scratch(robot),
