@@ -57,9 +57,10 @@ class TrackerController(Controller):
         if math.isinf(self.goal_ahead):
             return self.tracker(joints, command)
         is_place = jnp.asarray([each.is_pose and not any(each.quantity.wraps) for each in families])[command.slot]
-        nearer = jnp.minimum(1.0, self.goal_ahead / jnp.maximum(length(command.value), 1e-6))
-        near = jnp.where(is_place[..., None], command.value * nearer[..., None], command.value)
-        return self.tracker(joints, Command(command.slot, near))
+        distance = length(command.value)
+        is_far = (is_place & (distance > self.goal_ahead))[..., None]
+        nearer = command.value / distance[..., None] * self.goal_ahead  # an exact sign where there is one axis
+        return self.tracker(joints, Command(command.slot, jnp.where(is_far, nearer, command.value)))
 
 
 class FlatController(Controller):

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from rebody.ranges import Positive
 from rebody.tasks.family_set import FamilySet
-from rebody.tasks.quantities import Quantity, length
+from rebody.tasks.quantities import Quantity, length, wrapped_where
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
 FARTHEST = 2.0
@@ -85,10 +85,7 @@ def seen_from(
 
 def _difference(place: Place, there, here):
     """In units of its scales; angles the shorter way round."""
-    if not any(place.quantity.wraps):
-        return there - here
-    scales = jnp.asarray(place.scales)
-    return place.quantity.difference(there * scales, here * scales) / scales
+    return wrapped_where(place.quantity.wraps, there - here, np.array(place.scales, np.float32))
 
 
 class TaskCode(eqx.Module):

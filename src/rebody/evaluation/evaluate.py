@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import jax
@@ -196,7 +196,7 @@ def start_seeds(specs: list[TaskSpec], seeds: Int[np.ndarray, " episode"]) -> li
 
     Were it the evaluation seed alone, all tasks of a seed would share one start, and be one sample of starts.
     """
-    texts = [json.dumps([asdict(spec), int(seed)]) for spec, seed in zip(specs, seeds, strict=True)]
+    texts = [json.dumps([spec.to_json(), int(seed)]) for spec, seed in zip(specs, seeds, strict=True)]
     return [int.from_bytes(hashlib.sha256(text.encode()).digest()[:8]) for text in texts]
 
 

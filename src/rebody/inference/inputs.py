@@ -34,11 +34,7 @@ def seen(values: Float[AnyArray, "*batch field"], fields: tuple[str, ...], scale
 
 def apart(a, b, fields: tuple[str, ...], scales: tuple[float, ...]) -> Float[AnyArray, "*batch field"]:
     """a - b of scaled fields; angles the shorter way round."""
-    if not set(fields) & set(ANGLES):
-        return a - b
-    wraps = tuple(field in ANGLES for field in fields)
-    unscaled = wrapped_where(wraps, (a - b) * jnp.asarray(scales))
-    return jnp.where(np.array(wraps), unscaled / jnp.asarray(scales), a - b)
+    return wrapped_where(tuple(field in ANGLES for field in fields), a - b, np.array(scales, np.float32))
 
 
 def rates(now, before, fields: tuple[str, ...], scales: tuple[float, ...]) -> Float[AnyArray, "*batch field"]:

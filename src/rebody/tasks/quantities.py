@@ -50,18 +50,18 @@ class Quantity:
         return length(self.difference(a, b))
 
 
-def wrapped(angle: Any) -> Any:
-    """An angle in [-pi, pi), left to the last bit as it is where it lies there already [rad]."""
-    turns = (angle + math.pi) // (2 * math.pi)
-    return angle - 2 * math.pi * turns
+def wrapped(angle: Any, unit: Any = 1.0) -> Any:
+    """An angle in [-pi, pi), left to the last bit as it is where it lies there already [`unit` rad]."""
+    turns = (unit * angle + math.pi) // (2 * math.pi)
+    return angle - 2 * math.pi / unit * turns
 
 
-def wrapped_where(wraps: tuple[bool, ...], difference: Any) -> Any:
-    """Differences [..., axis], those of angles the shorter way round."""
+def wrapped_where(wraps: tuple[bool, ...], difference: Any, units: Any = 1.0) -> Any:
+    """Differences [..., axis], those of angles the shorter way round; in units of so many rad."""
     if not any(wraps):
         return difference
     xp = jnp if isinstance(difference, jax.Array) else np
-    return xp.where(np.array(wraps), wrapped(difference), difference)
+    return xp.where(np.array(wraps), wrapped(difference, units), difference)
 
 
 def length(vector: Any) -> Any:

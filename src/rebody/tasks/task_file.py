@@ -42,6 +42,14 @@ class TaskSpec:
         """The task that the episode ends with, which its final error is taken against."""
         return self if self.switch is None else TaskSpec(self.switch.family, self.switch.target)
 
+    def to_json(self) -> dict[str, Any]:
+        """As in a task file; a vector of one is a number."""
+        own, switch = {"family": self.family, "target": _plain(self.target)}, None
+        if self.switch is not None:
+            after = {"family": self.switch.family, "target": _plain(self.switch.target)}
+            switch = {"at_s": self.switch.at_s, **after}
+        return {**own, "switch": switch}
+
     @property
     def families(self) -> tuple[str, ...]:
         """Those that are asked for, in their order in time."""
@@ -84,6 +92,10 @@ def active_tasks(specs: list[TaskSpec], families: FamilySet, decisions: int, dec
             one = families.task(task.family, task.target)
             family[when, episode], target[when, episode] = one.family, one.target
     return Task(family, target)
+
+
+def _plain(target: Target) -> float | list[float]:
+    return target[0] if len(target) == 1 else list(target)
 
 
 def _task(entry: Any, families: FamilySet, where: str) -> TaskSpec:
