@@ -70,7 +70,7 @@ class Family:
             raise ValueError("targets: there must be one that is not 0")
         if any(len(direction.towards) != quantity.size for direction in self.directions):
             raise ValueError(f"directions: each must point to {quantity.size} numbers")
-        if self.law not in LAWS or self.law_source != LAWS[self.law].source:
+        if self.law not in LAWS or self.law_source not in ("", LAWS[self.law].source):
             raise ValueError(
                 f"law: '{self.law}' is not known as it was; name the file that defines it, --families FILE"
             )

@@ -30,6 +30,12 @@ LAWS = {
 """By name, which is what families and artifacts say; `rebody.tasks.family_file` adds a user's own."""
 
 
+def add_law(law: RewardLaw) -> None:
+    """Make a user's own law known under its name; RebodyError where another one has it."""
+    if LAWS.setdefault(law.name, law).source != law.source:
+        raise RebodyError(f"a reward law '{law.name}' is known already; choose another name.")
+
+
 def law_named(name: str) -> RewardLaw:
     """RebodyError if there is none of that name."""
     if name in LAWS:
