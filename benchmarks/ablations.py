@@ -41,7 +41,7 @@ def main() -> None:
     rows = {}
     for name in arguments.only:
         out = arguments.out / name.replace(" ", "-").replace("=", "")
-        train(["inference", "--preset", "goal-velocity", *BUDGET.split(), *VARIANTS[name].split()], out)
+        train(["inference", "goal-velocity", *BUDGET.split(), *VARIANTS[name].split()], out)
         minutes = json.loads((out / "config.json").read_text())["training"]["wall_s"] / 60
         rows[name] = {"training [min]": minutes} | figures_of(str(out))
     show(rows)

@@ -36,19 +36,21 @@ from rebody.training.step_predictor import report as step_predictor
 from rebody.training.tracker import report as tracker
 
 TURNS = 40
-ROBOTS = f"--robot cheetah --robots 4 --iterations {TURNS}"
+ROBOTS = f"--robots 4 --iterations {TURNS}"
+ON_CHEETAH = f"--robot cheetah {ROBOTS}"
 SAC = "--sac.hidden 8 8 --sac.batch-size 8"
 TRAINERS = {
-    "inference": f"""--episodes 8 --decisions 24 --groups 2 --wander-iterations 2 --joint-iterations 10
+    "inference": f"""position --episodes 8 --decisions 24 --groups 2 --wander-iterations 2 --joint-iterations 10
         --policy-iterations {TURNS - 12} --inference-updates 2 --policy-updates 2 --inference.units 8
         --inference.window 4 --inference.batch-size 4 --inference.decoded 2 {SAC} --sac.projections 2 --prior mixture
         --mixture.from-iteration 1 --mixture.points 60""",
-    "tracker": f"{ROBOTS} --steps 4 --updates 2 --replay 60 {SAC}",
-    "flat": f"{ROBOTS} --inference position --steps 4 --updates 2 --replay 60 --decisions 5 {SAC} --sac.projections 0",
-    "scratch": f"""{ROBOTS} --decisions 6 --groups 2 --inference-updates 2 --policy-updates 2 --inference.units 8
+    "tracker": f"cheetah {ROBOTS} --steps 4 --updates 2 --replay 60 {SAC}",
+    "flat": f"""{ON_CHEETAH} --inference position --steps 4 --updates 2 --replay 60 --decisions 5 {SAC}
+        --sac.projections 0""",
+    "scratch": f"""{ON_CHEETAH} --decisions 6 --groups 2 --inference-updates 2 --policy-updates 2 --inference.units 8
         --inference.window 4 --inference.batch-size 4 --inference.decoded 2 {SAC} --sac.projections 0""",
-    "high-level": f"{ROBOTS} --steps 4 --updates 2 --replay 60 --decisions 5 {SAC} --sac.projections 0",
-    "step-predictor": f"{ROBOTS} --steps 20 --updates 2 --replay 60 {SAC}",
+    "high-level": f"{ON_CHEETAH} --steps 4 --updates 2 --replay 60 --decisions 5 {SAC} --sac.projections 0",
+    "step-predictor": f"{ON_CHEETAH} --steps 20 --updates 2 --replay 60 {SAC}",
     "classifier": f"--episodes 8 --hidden 8 --batch-size 8 --updates 2 --iterations {TURNS}",
 }
 SHORT = (

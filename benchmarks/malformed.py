@@ -272,7 +272,7 @@ BASES: tuple[tuple[list[str], dict[str, Sequence[str]]], ...] = (
         {"--seeds": (*NUMBERS, "100000000"), "--seconds": NUMBERS, "--inference": WORDS, "--agent": WORDS},
     ),
     (
-        ["train", "inference", "--out", "new"],
+        ["train", "inference", "position", "--out", "new"],
         {
             "--seed": ("-1", "4294967296", "9223372036854775808", "1e3", "nan"),
             "--episodes": NUMBERS,
@@ -282,18 +282,16 @@ BASES: tuple[tuple[list[str], dict[str, Sequence[str]]], ...] = (
             "--inference.window": ("0", "-3", "201", "nan"),
             "--joint-iterations": ("-1", "nan", "99999999"),
             "--turn-probability": ("nan", "2", "-1"),
-            "--preset": WORDS,
         },
     ),
     (
-        ["train", "tracker", "--robot", "cheetah", "--out", "new"],
+        ["train", "tracker", "cheetah", "--out", "new"],
         {
             "--robots": (*NUMBERS, "100000000"),
             "--replay": ("-1", "0", "nan", "99999999999"),
             "--push-every-s": ("nan", "0", "-1", "inf"),
             "--iterations": ("-1", "nan", "99999999"),
             "--segment-s": ("nan", "-1"),
-            "--robot": WORDS,
             "--reward.alive": ("nan", "-1"),
         },
     ),
@@ -331,12 +329,20 @@ ODD = (
     "/",
 )
 TAKEN = ("fifo", "/dev/zero", "/dev/null", "loop", "good.json/file", "same.json", "good.json")
-INPUTS = (["evaluate", "--tasks"], ["infer"], ["robot", "check"], ["run", "--task", "goal=3", "--robot"], ["report"])
+INPUTS = (
+    ["evaluate", "--tasks"],
+    ["infer"],
+    ["robot", "check"],
+    ["run", "--task", "goal=3", "--robot"],
+    ["report"],
+    ["train", "inference"],
+    ["train", "tracker"],
+)
 OUTPUTS = (
     [*FILE, *ON_TOY, "--json"],
     [*TASK, *ON_TOY, "--figure"],
-    ["train", "tracker", "--robot", "cheetah", "--out"],
-    ["train", "inference", "--out"],
+    ["train", "tracker", "cheetah", "--out"],
+    ["train", "inference", "position", "--out"],
 )
 
 

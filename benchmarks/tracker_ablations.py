@@ -54,7 +54,7 @@ def figures_of_slot(out: Path, slot: str) -> dict[str, float]:
 
 def figures_of(out: Path, flags: str) -> dict[str, float]:
     """Train a variant, or go on with it, and measure it."""
-    train(["tracker", "--robot", ROBOT, *BUDGET.split(), *flags.split()], out)
+    train(["tracker", ROBOT, *BUDGET.split(), *flags.split()], out)
     minutes = json.loads((out / "config.json").read_text())["training"]["wall_s"] / 60
     return {"training [min]": minutes} | measure(load_tracker(str(out)).tracker, load_robot(ROBOT))
 

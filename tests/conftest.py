@@ -149,11 +149,11 @@ def trial(inference, tracker, flat_policy, cheetah):
 
 FLAGS = {
     "tracker": """
-        train tracker --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60
+        train tracker cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60
         --sac.hidden 8 8 --sac.batch-size 8
     """,
     "inference": """
-        train inference --episodes 8 --decisions 24 --groups 2
+        train inference position --episodes 8 --decisions 24 --groups 2
         --wander-iterations 1 --joint-iterations 2 --policy-iterations 6 --inference-updates 2 --policy-updates 2
         --inference.units 8 --inference.window 4 --inference.batch-size 4 --inference.decoded 2
         --sac.hidden 8 8 --sac.projections 2 --sac.batch-size 8
@@ -177,8 +177,9 @@ FLAGS = {
         --sac.hidden 8 8 --sac.batch-size 8
     """,
 }
-FULL = """
-    --preset goal-velocity-stand --switch-share 0.5 --mixture.from-iteration 1 --mixture.maximum 6
+FULL = f"""
+    {FLAGS["inference"].replace("position", "goal-velocity-stand")}
+    --switch-share 0.5 --mixture.from-iteration 1 --mixture.maximum 6
     --inference.window None --inference.latent 5 --inference.kinds 2 --inference.label-weight 0.05
     --wander-iterations 1 --joint-iterations 2 --policy-iterations 1
 """
@@ -234,7 +235,7 @@ def full_module(tmp_path_factory) -> Path:
     """Folder of an inference module of the full toy."""
     folder = tmp_path_factory.mktemp("trained") / "full"
     with in_short():
-        assert run([*FLAGS["inference"].split(), *FULL.split(), "--out", str(folder)]) == 0
+        assert run([*FULL.split(), "--out", str(folder)]) == 0
     return folder
 
 

@@ -30,6 +30,8 @@ API = {
 """Pages of the Python API, and the package or module that each shows."""
 SUBCOMMAND = re.compile(r"• ([\w-]+)")
 """How a help lists them."""
+ALIKE = (("train", "inference"), ("train", "tracker"))
+"""Commands whose subcommands differ in their defaults alone: one of them is shown."""
 COLUMNS = "84"
 
 
@@ -58,7 +60,8 @@ def helps(command: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
         parse([*command, "--help"])
     text = printed.getvalue()
     yield " ".join(("rebody", *command)), text
-    for name in SUBCOMMAND.findall(text):
+    names = SUBCOMMAND.findall(text)
+    for name in names[:1] if command in ALIKE else names:
         yield from helps((*command, name))
 
 

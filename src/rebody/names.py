@@ -1,14 +1,17 @@
 """What can be asked for by name, with a line about each: all that `rebody list` prints.
 
 Importing this loads no library, so that a list or a help costs nothing. Agents and figures are described here and
-nowhere else; families and presets are described where they are defined, and tests hold these lines to that.
+nowhere else; families are described where they are defined, and a test compares; presets and commands are described by
+their docstrings, which are read from the source.
 """
 
+import ast
 from pathlib import Path
 
 POINT_MASS = "point-mass"
 ROBOTS = Path(__file__).parent / "bodies" / "robots"
 ARTIFACTS = Path(__file__).parent / "artifacts"
+PRESETS = Path(__file__).parent / "training" / "inference" / "presets.py"
 
 FAMILIES = {
     "goal": "m, solved within 0.25",
@@ -28,26 +31,6 @@ AGENTS = {
     "idle": "knows nothing and stands still",
 }
 """Every kind of agent, and what it is."""
-PRESETS = {
-    "position": "Reach a hidden position within +-10 m on the mass-damper, reward -|error| (thesis 6.3.1).",
-    "position-thesis": (
-        "The thesis' first experiment (6.3.1): positions in [0, 10] m, steps of at most 0.1 m, a latent of one number."
-    ),
-    "goal-velocity": (
-        "Reach a hidden position or run at a hidden speed, front or back (thesis 6.4.2), told apart without labels."
-    ),
-    "goal-velocity-thesis": "`goal-velocity` on the ranges of the thesis' code: +-[1, 25] m and +-[0.5, 3] m/s.",
-    "goal-velocity-noise-0": "`goal-velocity` without ripple, lag and gain: nothing disturbs the toy.",
-    "goal-velocity-noise-0.1": ("`goal-velocity` with the thesis' observation noise of variance 0.1 in their place."),
-    "goal-velocity-noise-0.2": ("`goal-velocity` with the thesis' observation noise of variance 0.2 in their place."),
-    "goal-velocity-stand": (
-        "`goal-velocity`, or stand at a hidden pitch, front or back, on the full toy (thesis 6.5.2)."
-    ),
-    "goal-velocity-jump": (
-        "`goal-velocity`, or leave the floor at a hidden vertical speed, on the full toy (thesis B.2)."
-    ),
-}
-"""Presets of `rebody train inference`."""
 FIGURES = {
     "6.1": "the toy in MuJoCo, and the forces on it",
     "6.2": "return during training on the toy",
@@ -78,6 +61,24 @@ FIGURES = {
 def shipped_robots() -> tuple[str, ...]:
     """Names of the robots that come with the package."""
     return tuple(sorted(path.stem for path in ROBOTS.glob("*.toml")))
+
+
+def presets() -> dict[str, str]:
+    """Presets of `rebody train inference`, with the first line of each."""
+    assigned = (node for node in ast.parse(PRESETS.read_text()).body if isinstance(node, ast.AnnAssign))
+    table = next(node.value for node in assigned if ast.unparse(node.target) == "PRESETS")
+    assert isinstance(table, ast.Dict)
+    lines = first_lines(PRESETS)
+    entries = zip(table.keys, table.values, strict=True)
+    return {ast.literal_eval(name): lines[ast.unparse(made_by)] for name, made_by in entries if name}
+
+
+def first_lines(source: Path) -> dict[str, str]:
+    """First lines of the docstrings of a file's classes and functions, by name."""
+    documented = (
+        node for node in ast.parse(source.read_text()).body if isinstance(node, ast.ClassDef | ast.FunctionDef)
+    )
+    return {node.name: (ast.get_docstring(node) or "").partition("\n")[0] for node in documented}
 
 
 def artifact_titles() -> dict[str, str]:

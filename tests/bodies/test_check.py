@@ -69,7 +69,7 @@ def test_actuators(actuator, says, tmp_path):
 
 def test_the_command(capsys, tmp_path):
     assert run(["robot", "check", "hopper"]) == 0
-    assert "ready: rebody train tracker --robot hopper" in capsys.readouterr().out
+    assert "ready: rebody train tracker hopper" in capsys.readouterr().out
     (tmp_path / "slow.toml").write_text(
         'mjcf = "gymnasium:hopper.xml"\nframe_skip = 7\n[root]\nx = "rootx"\nz = "rootz"\npitch = "rooty"\n'
         "[fall]\n[reach]\nspeed = [-1.0, 1.0]\n"

@@ -79,7 +79,7 @@ def test_the_check_says_what_is_wrong(wrong):
 
 def test_a_tracker_is_not_trained_on_it(wrong, tmp_path, capsys):
     path, expected = wrong
-    assert run(["train", "tracker", "--robot", path, "--out", str(tmp_path / "tracker")]) == 2
+    assert run(["train", "tracker", path, "--out", str(tmp_path / "tracker")]) == 2
     said = capsys.readouterr().err
     assert "robot 'own' is not ready" in said
     for subject, says in expected.items():
@@ -113,7 +113,7 @@ def test_nothing_else_is_trained_on_it(kind, write_own, tmp_path, capsys):
     ],
 )
 def test_a_model_that_mujoco_cannot_have_is_one_message(mjcf, says, write_own, tmp_path, capsys):
-    assert run(["train", "tracker", "--robot", write_own(mjcf=mjcf), "--out", str(tmp_path / "tracker")]) == 2
+    assert run(["train", "tracker", write_own(mjcf=mjcf), "--out", str(tmp_path / "tracker")]) == 2
     said = capsys.readouterr().err
     assert "error: " in said
     assert says in said
@@ -129,9 +129,7 @@ FILTERED = [
 ]
 DELAYED = [('<motor name="muscle"', '<motor name="muscle" delay="0.05" nsample="5"')]
 USABLE = {"ball joint": BALL, "second free body": SECOND, "filtered actuator": FILTERED, "delayed actuator": DELAYED}
-TINY = """
-    train tracker --robots 4 --steps 4 --updates 2 --iterations 2 --replay 60 --sac.hidden 8 8 --sac.batch-size 8
-"""
+TINY = "--robots 4 --steps 4 --updates 2 --iterations 2 --replay 60 --sac.hidden 8 8 --sac.batch-size 8"
 
 
 @pytest.mark.parametrize("kind", USABLE)
@@ -142,7 +140,7 @@ def test_an_unusual_robot_is_ready(kind, write_own):
 @pytest.mark.usefixtures("measured_in_short")
 def test_a_robot_that_is_all_of_this_is_trained(write_own, tmp_path):
     path = write_own(mjcf=[*BALL, *SECOND, *FILTERED])
-    assert run([*TINY.split(), "--robot", path, "--out", str(tmp_path / "tracker")]) == 0
+    assert run(["train", "tracker", path, *TINY.split(), "--out", str(tmp_path / "tracker")]) == 0
     assert (tmp_path / "tracker" / "card.md").exists()
 
 

@@ -167,5 +167,5 @@ def test_a_log_is_not_written_over(name, place, tmp_path, capsys):
     log.write_text(LOG.read_text())
     place(log, there)
     assert run(["infer", str(log), "--out", str(tmp_path)]) == 2
-    assert "would write over the log" in capsys.readouterr().err
+    assert "would write over what is read" in capsys.readouterr().err
     assert log.read_text() == there.read_text() == LOG.read_text()

@@ -221,14 +221,15 @@ def test_a_module_of_the_position_toy(tiny_training, tmp_path):
     """The thesis' first experiment, untrained; any setting of a preset can be changed."""
     untrained = ["--wander-iterations", "0", "--joint-iterations", "0", "--policy-iterations", "0"]
     out = str(tmp_path / "thesis")
-    assert run([*tiny_training["inference"], *untrained, "--preset", "position-thesis", "--out", out]) == 0
+    thesis = [*tiny_training["inference"], *untrained]
+    thesis[2] = "position-thesis"
+    assert run([*thesis, "--out", out]) == 0
     loaded = load_inference(out)
     assert loaded.toy == PositionToy()
     assert loaded.contract.target_ranges == {"goal": (0.0, 10.0)}
     assert loaded.parts.module.encoder.latent == 1
     assert loaded.parts.high_level.view.fields == loaded.parts.told_policy.view.fields == ("x",)
-    other = [*tiny_training["inference"], *untrained, "--preset", "position-thesis", "--toy", "mass-damper"]
-    assert run([*other, "--out", str(tmp_path / "other")]) == 0
+    assert run([*thesis, "--toy", "mass-damper", "--out", str(tmp_path / "other")]) == 0
     assert load_inference(str(tmp_path / "other")).toy == MassDamper()
 
 
@@ -330,7 +331,7 @@ def test_a_flipped_byte_is_noticed_wherever_it_is(name, file, trained, evaluate,
 
 @pytest.mark.parametrize("name", ["tracker", "inference"])
 def test_a_missing_artifact_or_file_is_named(name, trained, evaluate, tmp_path, capsys):
-    refused(evaluate(f"--{name}", str(tmp_path / "none"))[0], capsys, str(tmp_path / "none"), "Shipped artifacts")
+    refused(evaluate(f"--{name}", str(tmp_path / "none"))[0], capsys, str(tmp_path / "none"), "or a folder of your own")
     broken = shutil.copytree(trained[name], tmp_path / "broken")
     (broken / "weights.safetensors").unlink()
     code, _ = evaluate(f"--{name}", str(broken))
@@ -387,7 +388,7 @@ def test_a_system_that_refuses_to_write_is_one_message(evaluate, monkeypatch, tm
 
 
 def test_unknown_options_are_usage_errors(capsys):
-    for words in ("evaluate", "run --task goal=1 --colour red", "train tracker --out x", "fly"):
+    for words in ("evaluate", "run --task goal=1 --colour red", "train tracker hopper", "fly"):
         with pytest.raises(SystemExit) as stopped:
             run(words.split())
         assert stopped.value.code == 2

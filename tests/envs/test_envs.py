@@ -119,7 +119,7 @@ def test_malformed_options(options, message):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"reward": "sparse"}, "unknown reward 'sparse'; choose one of plain, relative"),
+        ({"reward": "sparse"}, "Rewards are: plain, relative"),
         ({"base_tasks": []}, "base_tasks is empty"),
         ({"base_tasks": [BaseTask("fly", 0.0, 1.0)]}, "unknown task family 'fly'"),
     ],

@@ -3,7 +3,11 @@
 import subprocess
 import sys
 
+import gymnasium
 import pytest
+from gymnasium.envs.registration import EnvSpec
+
+import rebody  # noqa: F401
 
 
 @pytest.mark.parametrize(
@@ -21,3 +25,10 @@ def test_registered_in_any_order(imports):
     robots = ("HalfCheetah", "Hopper", "Walker2d")
     expected = {f"rebody/{robot}{what}-v0" for robot in robots for what in ("", "Tracker")} | {"rebody/PointMass-v0"}
     assert set(done.stdout.split()) == expected
+
+
+@pytest.mark.parametrize("name", ["rebody/PointMass-v0", "rebody/HopperTracker-v0"])
+def test_a_specification_survives_json(name):
+    spec = gymnasium.spec(name)
+    made = gymnasium.make(EnvSpec.from_json(spec.to_json()))
+    assert made.reset(seed=0)[0] in made.observation_space

@@ -10,10 +10,10 @@ from PIL import Image
 
 from rebody.cli.main import run
 from rebody.errors import RebodyError
-from rebody.report.thesis import FIGURES, data, find_figures, make_figure, retrained, zero_shot
-from rebody.report.thesis import first_experiment as first
-from rebody.report.thesis import several_families as several
-from rebody.report.thesis.data import join, on_goals, save, split, training_log, trajectories
+from rebody.report.thesis import FIGURES, catalogue, data, episodes, find_figures, make_figure, panels
+from rebody.report.thesis.data import join, on_goals, save, split, trajectories
+from rebody.report.thesis.learning import HIGH_LEVELS
+from rebody.report.thesis.trainings import training_log
 from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.tasks.task_file import Switch, TaskSpec
 
@@ -53,12 +53,12 @@ def several_of(episodes=3, families=(GOAL, VELOCITY)):
 
 
 PICTURE = {"picture": np.random.default_rng(0).integers(0, 255, (48, 64, 3)).astype(np.uint8)}
-STRIDES = {str(stride): episodes_of(1, decision_s=0.05 * stride) for stride in first.STRIDES}
-ON_ROBOT = several_of(several.EPISODES) | {"toy_pca": several_of()["pca"]}
+STRIDES = {str(stride): episodes_of(1, decision_s=0.05 * stride) for stride in episodes.STRIDES}
+ON_ROBOT = several_of(panels.EPISODES) | {"toy_pca": several_of()["pca"]}
 SYNTHETIC = {
     "6.1": PICTURE,
     "6.2": curves_of("return", "evaluation/return", "evaluation/oracle return"),
-    "6.3": episodes_of(1, targets=first.THESIS_GOALS),
+    "6.3": episodes_of(1, targets=episodes.THESIS_GOALS),
     "6.5": episodes_of(2),
     "6.6": curves_of("task_reward", "evaluation/goal median", "evaluation/goal p95"),
     "6.7": curves_of(*(f"evaluation/{slot} {of}" for slot in ("goal", "velocity", "stand")
@@ -66,21 +66,26 @@ SYNTHETIC = {
     "6.8": episodes_of(1, targets=(3.0,), decision_s=0.05),  # a single goal
     "6.9": join(STRIDES | {"ours": episodes_of(2)}),
     **dict.fromkeys(("6.10", "6.11"), join({"thesis": episodes_of(1), "ours": episodes_of(2)})),
-    "6.12": join({robot: curves_of("reward", "falls_per_minute", measured_every=1) for robot in ("hopper", "walker")}),
+    "6.12": join(
+        {
+            f"tracker-{robot}": curves_of("reward", "falls_per_minute", measured_every=1)
+            for robot in ("hopper", "walker")
+        }
+    ),
     "6.13": curves_of(
         "return", "evaluation/return", "evaluation/oracle return", "evaluation/goal median",
         "evaluation/velocity median", "mixture/components", "mixture/births", "mixture/merges", "mixture/purity",
         "mixture/ari",
     ),
-    "6.14a": several_of(several.EPISODES),
+    "6.14a": several_of(panels.EPISODES),
     "6.14b": several_of(),
-    "6.15": join({name: several_of(several.EPISODES) for name in zero_shot.RANDOMISED}),
-    "6.19": join({f"high-level-{m}-{robot}": curves_of("evaluation/return") for m, robot in retrained.POLICIES}),
+    "6.15": join({name: several_of(panels.EPISODES) for name in catalogue.RANDOMISED}),
+    "6.19": join({name: curves_of("evaluation/return") for name in HIGH_LEVELS}),
     **dict.fromkeys(
         ("6.20", "6.21"),
-        join({f"high-level-{m}-{robot}": several_of(several.EPISODES) for m, robot in retrained.POLICIES}),
+        join({name: several_of(panels.EPISODES) for name in HIGH_LEVELS}),
     ),
-    "6.22": several_of(several.EPISODES, (GOAL, VELOCITY, STAND)),
+    "6.22": several_of(panels.EPISODES, (GOAL, VELOCITY, STAND)),
     **dict.fromkeys(("6.16", "6.17", "6.18"), ON_ROBOT),
 }  # fmt: skip
 
@@ -123,22 +128,22 @@ def test_figures_are_found_by_number():
     assert [figure.number for figure in find_figures(["6.9", "6.1", "6.9"])] == ["6.9", "6.1"]
     assert find_figures(["all"]) == list(FIGURES.values())
     with pytest.raises(
-        RebodyError, match=r"no figure '6\.99'\. Did you mean '6\.9'\? Figures are: 6\.1, 6\.2, .*, or all"
+        RebodyError, match=r"unknown figure '6\.99'\. Did you mean '6\.9'\? Figures are: 6\.1, 6\.2, .*, or all"
     ):
         find_figures(["6.1", "6.99"])
 
 
 @pytest.fixture
-def figure():
+def figure(monkeypatch):
     """A figure out of synthetic logs, which says where it took them from."""
     told = []
 
-    def rerun(runs):
-        told.append(runs)
+    def rerun():
+        told.append("anew")
         return episodes_of(1, targets=(1.0, 2.0))
 
-    made = replace(FIGURES["6.3"], shipped=lambda: SYNTHETIC["6.3"], rerun=rerun)
-    return made, told
+    monkeypatch.setattr(data, "shipped", SYNTHETIC.get)
+    return replace(FIGURES["6.3"], log=rerun), told
 
 
 def test_a_figure_is_made_from_what_ships(figure, tmp_path):
@@ -152,7 +157,7 @@ def test_a_figure_is_made_from_what_ships(figure, tmp_path):
 def test_a_rerun_leaves_its_log(figure, tmp_path):
     made, told = figure
     assert_drawn(make_figure(made, tmp_path, rerun=True))
-    assert told == [tmp_path / "runs"]
+    assert told == ["anew"]
     log = safetensors.numpy.load_file(tmp_path / "6.3.safetensors")
     np.testing.assert_array_equal(log["target"], [1.0, 2.0])
     made.draw(log, tmp_path / "again.png", CAPTION)
@@ -160,9 +165,9 @@ def test_a_rerun_leaves_its_log(figure, tmp_path):
 
 
 @pytest.mark.parametrize("rerun", [False, True])
-def test_the_caption_says_how_it_was_made(figure, tmp_path, rerun):
-    captions = []
-    made = replace(figure[0], draw=lambda log, path, text: captions.append(text))
+def test_the_caption_says_how_it_was_made(figure, tmp_path, rerun, monkeypatch):
+    captions, made = [], figure[0]
+    monkeypatch.setattr(panels, "caption", lambda drawing, text: captions.append(text))
     make_figure(made, tmp_path, rerun=rerun)
     command, source = ("rebody figure 6.3 --rerun", "anew") if rerun else ("rebody figure 6.3", "the log that ships")
     assert captions[0].startswith(made.caption)
@@ -193,7 +198,7 @@ def test_logs_are_joined_and_split_and_saved(tmp_path):
     [("inference", 8 * 24, "return"), ("tracker", 4 * 4, "critic_loss"), ("flat", 4 * 4, "task_reward")],
 )
 def test_training_curves_come_out_of_the_artifact(trained, kind, per_iteration, measured):
-    log = training_log(trained[kind], kind)
+    log = training_log(trained[kind])
     np.testing.assert_array_equal(log["steps"], per_iteration * np.arange(1, 10))
     assert np.isfinite(log[measured]).all()
     assert {len(column) for column in log.values()} == {9}
@@ -241,15 +246,15 @@ def test_the_latents_that_are_shown_are_those_of_evenly_spaced_tasks(monkeypatch
     def listen(trial, specs):
         asked.extend(specs)
         targets = np.array([spec.target for spec in specs])
-        return several_of(several.EPISODES) | {"latent": np.random.default_rng(0).normal(size=(40, len(targets), 6))}
+        return several_of(panels.EPISODES) | {"latent": np.random.default_rng(0).normal(size=(40, len(targets), 6))}
 
-    monkeypatch.setattr(several, "load_inference", lambda name: trial.inference)
-    monkeypatch.setattr(several, "trajectories", listen)
-    log = several.projections()
+    monkeypatch.setattr(episodes, "load_inference", lambda name: trial.inference)
+    monkeypatch.setattr(episodes, "trajectories", listen)
+    log = episodes.projections()
     of_family = {name: sorted(spec.target for spec in asked if spec.family == name) for name in ("goal", "velocity")}
     np.testing.assert_allclose(of_family["goal"], np.sort(np.r_[1, -1][:, None] * np.linspace(2, 15, 12), axis=None))
     np.testing.assert_allclose(of_family["velocity"], np.sort(np.r_[1, -1][:, None] * np.linspace(1, 3, 12), axis=None))
-    shown = several.on_toy()["latent"][several.FROM :: several.EVERY]
+    shown = episodes.on_toy()["latent"][episodes.FROM :: episodes.EVERY]
     assert log["tsne"].shape == log["pca"].shape == (*shown.shape[:2], 2)
     flat, pca = shown.reshape(-1, 6), log["pca"].reshape(-1, 2)
     largest = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False)[:2]
@@ -258,9 +263,9 @@ def test_the_latents_that_are_shown_are_those_of_evenly_spaced_tasks(monkeypatch
 
 def test_each_base_task_has_its_name_and_colour():
     data = {"family": np.array([GOAL, GOAL, VELOCITY, VELOCITY]), "target": np.array([3.0, -3.0, 1.0, -1.0])}
-    names = [several.BASE_TASKS[label][0] for label in several._labels(data)]
+    names = [panels.BASE_TASKS[label][0] for label in panels.labels(data)]
     assert names == ["goal in front", "goal behind", "run forward", "run backward"]
-    assert len({colour for _, colour in several.BASE_TASKS.values()}) == len(several.BASE_TASKS)
+    assert len({colour for _, colour in panels.BASE_TASKS.values()}) == len(panels.BASE_TASKS)
 
 
 def test_every_figure_has_a_number_that_the_list_shows(capsys):

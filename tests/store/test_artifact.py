@@ -53,7 +53,7 @@ def test_shipped_names(shipped):
 
 def test_of_any_kind(shipped, folder):
     assert [load_artifact(each).kind for each in ("tracker-cheetah", folder)] == ["tracker", "inference"]
-    with pytest.raises(RebodyError, match=r"Shipped artifacts: goal-velocity, mine, tracker-cheetah\."):
+    with pytest.raises(RebodyError, match=r"Artifacts are: goal-velocity, mine, tracker-cheetah, or a folder"):
         load_artifact("nowhere")
 
 

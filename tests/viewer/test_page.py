@@ -20,7 +20,7 @@ from rebody.tasks.task_file import TaskSpec
 
 viser = pytest.importorskip("viser")
 pytest.importorskip("mjviser")
-from rebody.viewer.controls import Choice, GiveTask, Offered, Push, Restart  # noqa: E402
+from rebody.viewer.controls import Choice, Offered, Push, Restart  # noqa: E402
 from rebody.viewer.page import Page  # noqa: E402
 from rebody.viewer.server import serving  # noqa: E402
 
@@ -136,7 +136,7 @@ def test_orders_are_carried_out(looked_at):
     with shown(TaskSpec("goal", 2.0)) as (page, _):
         orders = page.controls.orders
         wait_for(lambda: hasattr(page, "session") and page.session.time_s > 0.3, "the start")
-        orders.put(GiveTask(TaskSpec("velocity", -1.0)))
+        orders.put(TaskSpec("velocity", -1.0))
         wait_for(lambda: page.session.task == TaskSpec("velocity", -1.0), "the task")
 
         cheetah = page.session
@@ -145,7 +145,7 @@ def test_orders_are_carried_out(looked_at):
         assert page.session.trial.robot is None
         assert page.session.task == TaskSpec("velocity", -1.0)
 
-        orders.put(GiveTask(TaskSpec("goal", 0.0)))
+        orders.put(TaskSpec("goal", 0.0))
         orders.put(Restart())
         wait_for(lambda: page.session.task.family == "goal", "the task")
         before = page.session.body.qpos[0]

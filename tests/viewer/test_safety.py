@@ -16,7 +16,7 @@ from rebody.tasks.task_file import TaskSpec
 viser = pytest.importorskip("viser")
 pytest.importorskip("mjviser")
 from rebody.viewer import page as page_module  # noqa: E402
-from rebody.viewer.controls import SPEEDS, Choice, GiveTask, Offered  # noqa: E402
+from rebody.viewer.controls import SPEEDS, Choice, Offered  # noqa: E402
 from rebody.viewer.page import Page  # noqa: E402
 from rebody.viewer.server import serving  # noqa: E402
 
@@ -159,7 +159,7 @@ def test_sliders_take_numbers_in_their_range(visit, toy_trial, heard):
 
 def test_a_target_that_is_no_number_leaves_the_task_as_it_was(toy_trial, heard):
     with shown(lambda _: toy_trial) as (page, _):
-        page.controls.orders.put(GiveTask(TaskSpec("goal", math.nan)))
+        page.controls.orders.put(TaskSpec("goal", math.nan))
         wait_for(lambda: bool(heard), "a complaint")
         assert page.session.task == TASK
 

@@ -19,7 +19,7 @@ from rebody.agents.slots import OneSlot, SlotChooser, SlotOfCluster
 from rebody.bodies import RobotSpec
 from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import is_predictable
-from rebody.errors import RebodyError, did_you_mean
+from rebody.errors import RebodyError, unknown
 from rebody.store import tree_hash
 from rebody.tasks import FamilySet
 from rebody.types import Task
@@ -33,7 +33,7 @@ SlotsBy = Literal["classifier", "clusters"]
 def check_agent(kind: str) -> None:
     """RebodyError if there is no agent of that kind."""
     if kind not in KINDS:
-        raise RebodyError(f"unknown agent '{kind}'.{did_you_mean(kind, KINDS)} Agents are: {', '.join(KINDS)}.")
+        raise unknown("agent", kind, KINDS)
 
 
 def check_robot_of(
@@ -46,7 +46,7 @@ def check_robot_of(
         raise RebodyError(
             f"'{part.name}' was trained on another description of '{spec.name}': it sees {part.tracker.joints} numbers "
             f"of the body, which now gives {spec.tracker_inputs}. "
-            f"Train it anew (rebody train tracker --robot {spec.name})."
+            f"Train it anew (rebody train tracker {spec.name})."
         )
 
 
@@ -72,11 +72,11 @@ def check_step_predictor(part: LoadedStepPredictor, tracker: LoadedTracker, infe
     """RebodyError if a step predictor knows another tracker, or not all that the module's subgoals may be about."""
     check_tracker_of("step predictor", part, tracker)
     check_predictor(part, tracker)
-    unknown = [family.name for family in inference.contract.families if not is_predictable(family)]
-    if unknown:
+    without = [family.name for family in inference.contract.families if not is_predictable(family)]
+    if without:
         raise RebodyError(
             f"step predictor '{part.name}' knows goals and speeds, and '{inference.name}' may ask for "
-            f"{', '.join(unknown)}. Use a fixed --stride."
+            f"{', '.join(without)}. Use a fixed --stride."
         )
 
 

@@ -10,7 +10,6 @@ from rich.markup import escape
 
 from rebody.agents.parts import load_inference
 from rebody.cli.output import check_output
-from rebody.errors import RebodyError
 from rebody.evaluation.logs import (
     Delimiter,
     Format,
@@ -49,7 +48,8 @@ class Infer:
 
     def run(self) -> None:
         """Read, listen, write, say what is believed at the end."""
-        self._check_out()
+        for name in (TABLE, PICTURE):
+            check_output(self.out and self.out / name, "--out", inputs=(self.log,))
         inference, console = load_inference(self.inference), Console(soft_wrap=True)
         contract = inference.contract
         form = Format(self.delimiter, self.decimal_comma, self.time_unit)
@@ -67,10 +67,3 @@ class Infer:
             save_beliefs(run, self.out / TABLE)
             plot_beliefs(run, self.out / PICTURE)
         console.print(f"{inference.name} {run.conclusion()}", highlight=False)
-
-    def _check_out(self) -> None:
-        """RebodyError where the results cannot be written, or would take the log's place."""
-        for path in [self.out / name for name in (TABLE, PICTURE)] if self.out is not None else []:
-            check_output(path, "--out")
-            if path.exists() and self.log.exists() and path.samefile(self.log):  # by a link, too
-                raise RebodyError(f"--out {self.out} would write over the log. Choose another folder.")

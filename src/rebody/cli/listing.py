@@ -26,7 +26,7 @@ class List:
         tables = {
             "family": names.FAMILIES,
             "agent": names.AGENTS,
-            "preset": names.PRESETS,
+            "preset": names.presets(),
             "artifact": names.artifact_titles(),
             "figure": names.FIGURES,
         }

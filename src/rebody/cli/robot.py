@@ -34,4 +34,4 @@ class Robot:
         wrong = [finding.subject for finding in findings if not finding.is_right]
         if wrong:
             raise RebodyError(f"robot '{spec.name}' is not ready: see {', '.join(wrong)}.")
-        console.print(f"ready: rebody train tracker --robot {self.robot} --out runs/tracker-{spec.name}", markup=False)
+        console.print(f"ready: rebody train tracker {self.robot} --out runs/tracker-{spec.name}", markup=False)

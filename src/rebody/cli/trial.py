@@ -2,16 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
 from rebody.agents.build import HORIZON, SlotsBy, check_agent
 from rebody.agents.parts import (
-    LoadedFlat,
-    LoadedHighLevel,
-    LoadedScratch,
-    LoadedStepPredictor,
+    Inference,
     load_flat,
     load_high_level,
     load_inference,
@@ -20,12 +17,12 @@ from rebody.agents.parts import (
     load_step_predictor,
     load_tracker,
 )
-from rebody.bodies import RobotSpec, load_robot
+from rebody.bodies import load_robot
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import POINT_MASS, Trial
 from rebody.names import AGENTS
-from rebody.tasks import SHIPPED
-from rebody.ranges import Count, Decisions, Seconds, check_ranges
+from rebody.ranges import Count, Decisions, Seconds
+from rebody.tasks.family_file import read_families
 
 AGENT_HELP = "; ".join(f"{name}: {what}" for name, what in AGENTS.items())
 
@@ -62,32 +59,46 @@ class TrialOptions:
     """Decisions that `reuse` looks ahead; default 15, in thesis mode 1."""
     thesis: bool = False
     """Thesis mode (6.3.3): the module hears of the world once per stride only."""
+    families: Path | None = None
+    """File of your own families, TOML or Python."""
 
     def load(self) -> Trial:
         """Load the parts; RebodyError where an option makes no sense or a part cannot be had."""
-        check_ranges(self)
         check_agent(self.agent)
-        stride = self._fixed_stride()
-        robot = None if self.robot == POINT_MASS else load_robot(self.robot)
-        inference = load_inference(self.inference)
-        bridged = robot is not None and self.agent == "reuse"
+        families = read_families(self.families)  # first: artifacts may name its laws
+        inference, robot, parts = load_inference(self.inference), None, {}
+        if self.robot != POINT_MASS:
+            robot = load_robot(self.robot)
+            parts = self._parts(inference, robot.name)
         return Trial(
             agent=self.agent,
             robot=robot,
             inference=inference,
-            families=SHIPPED,
-            tracker=load_tracker(f"tracker-{robot.name}" if self.tracker is None else self.tracker) if robot else None,
-            flat=self._flat(robot),
-            scratch=self._scratch(robot),
-            high_level=self._high_level(robot),
-            slots=load_slots_of(inference, self.classifier) if bridged else None,
+            families=families,
             slots_by=self.slots_by,
             seconds=self.seconds,
-            stride=stride,
+            stride=self._fixed_stride(),
             horizon=self.horizon or (1 if self.thesis else HORIZON),
             thesis=self.thesis,
-            step_predictor=self._step_predictor(robot),
+            **{"tracker": None} | parts,
         )
+
+    def _parts(self, inference: Inference, robot: str) -> dict[str, Any]:
+        """What moves a robot: its tracker, and what else the agent needs."""
+        module = Path(self.inference).name
+        parts: dict[str, Any] = {"tracker": load_tracker(_named(self.tracker, f"tracker-{robot}"))}
+        match self.agent:
+            case "flat":
+                parts["flat"] = load_flat(_named(self.flat, f"flat-{module}-{robot}"))
+            case "scratch":
+                parts["scratch"] = load_scratch(_named(self.scratch, f"scratch-{robot}"))
+            case "retrain":
+                parts["high_level"] = load_high_level(_named(self.high_level, f"high-level-{module}-{robot}"))
+            case "reuse":
+                parts["slots"] = load_slots_of(inference, self.classifier)
+        if self.stride == "predicted":
+            parts["step_predictor"] = load_step_predictor(_named(self.step_predictor, f"step-predictor-{robot}"))
+        return parts
 
     def _fixed_stride(self) -> int:
         """The number, 1 where there is none; RebodyError where nothing can be predicted."""
@@ -99,26 +110,6 @@ class TrialOptions:
             raise RebodyError("--stride predicted counts control steps of a robot; a point mass has none.")
         return 1
 
-    def _flat(self, robot: RobotSpec | None) -> LoadedFlat | None:
-        if robot is None or self.agent != "flat":
-            return None
-        return load_flat(f"flat-{Path(self.inference).name}-{robot.name}" if self.flat is None else self.flat)
 
-    def _scratch(self, robot: RobotSpec | None) -> LoadedScratch | None:
-        if robot is None or self.agent != "scratch":
-            return None
-        return load_scratch(f"scratch-{robot.name}" if self.scratch is None else self.scratch)
-
-    def _high_level(self, robot: RobotSpec | None) -> LoadedHighLevel | None:
-        if robot is None or self.agent != "retrain":
-            return None
-        return load_high_level(
-            f"high-level-{Path(self.inference).name}-{robot.name}" if self.high_level is None else self.high_level
-        )
-
-    def _step_predictor(self, robot: RobotSpec | None) -> LoadedStepPredictor | None:
-        if robot is None or self.stride != "predicted":
-            return None
-        return load_step_predictor(
-            f"step-predictor-{robot.name}" if self.step_predictor is None else self.step_predictor
-        )
+def _named(given: str | None, default: str) -> str:
+    return default if given is None else given

@@ -14,17 +14,18 @@ _ROBOTS = {"HalfCheetah": ("cheetah", 0.05), "Hopper": ("hopper", 0.02), "Walker
 _SECONDS, _DECISION_DT = 20.0, 0.1
 
 
-def register_environments(trackers: str) -> None:
+def register_environments(tracker_env: str) -> None:
     """Tell Gymnasium where `rebody/PointMass-v0`, `rebody/HalfCheetah-v0` ... are; they load when made.
 
-    `trackers` is where the learning problem of a robot's tracker is, MODULE:CLASS, on a floor above this one.
+    `tracker_env` is what makes the learning problem of a robot's tracker, which is on a floor above this one:
+    MODULE:FUNCTION of the caller, since Gymnasium cannot serialise the specification of a function itself.
     """
     _register("PointMass", "PointMass", _DECISION_DT, {})
     for name, (robot, control_dt) in _ROBOTS.items():
         _register(name, "Robot", control_dt, {"robot": robot})
         gymnasium.register(
             f"rebody/{name}Tracker-v0",
-            entry_point=trackers,
+            entry_point=tracker_env,
             kwargs={"robot": robot},
             max_episode_steps=round(_SECONDS / control_dt),
         )

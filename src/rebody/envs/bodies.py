@@ -1,6 +1,5 @@
 """What an environment needs of bodies: any number of copies that reset one by one and step together."""
 
-from abc import ABC, abstractmethod
 from typing import Any
 
 import equinox as eqx
@@ -16,47 +15,11 @@ from rebody.jax_settings import own_jax_settings
 from rebody.types import GlobalState, global_state
 
 
-class Bodies(ABC):
-    """Copies of one body."""
-
-    size: int
-    actions: int
-    """Numbers in the action of one body, each in [-1, 1]."""
-    root: int
-    """Id in the model of the body that a camera follows."""
-
-    @property
-    @abstractmethod
-    def model(self) -> mujoco.MjModel:
-        """What a camera draws."""
-
-    @property
-    @abstractmethod
-    def qpos(self) -> Float[np.ndarray, "body nq"]:
-        """A copy of the joint positions [m, rad]."""
-
-    @property
-    @abstractmethod
-    def qvel(self) -> Float[np.ndarray, "body nv"]:
-        """A copy of the joint velocities [m/s, rad/s]."""
-
-    @abstractmethod
-    def reset(self, body: int, rng: np.random.Generator) -> None:
-        """Put one body at x = 0."""
-
-    @abstractmethod
-    def step(self, actions: Float[np.ndarray, "body action"]) -> None:
-        """One step of every body."""
-
-    @abstractmethod
-    def global_state(self) -> GlobalState:
-        """The body-neutral readout; velocities are means over the last 0.1 s."""
-
-
-class PointMasses(Bodies):
+class PointMasses:
     """Nominal mass-dampers, at rest after a reset. A step is a decision of 0.1 s."""
 
     actions, root = 1, 1
+    """Numbers in the action of one body, each in [-1, 1], and the id in the model of what a camera follows."""
 
     def __init__(self, size: int):
         self.size = size
@@ -101,7 +64,7 @@ def _advance(toy, x, vx, actions) -> tuple[Float[Array, " body"], Float[Array, "
     return state.x, state.vx
 
 
-class Robots(Bodies):
+class Robots:
     """Copies of one robot. A step is a control step."""
 
     def __init__(self, spec: RobotSpec, size: int, threads: int = 0):
@@ -149,3 +112,6 @@ class Robots(Bodies):
     def global_state(self) -> GlobalState:
         """The readout of every robot; before its first step each counts as having stood still."""
         return self._spec.observe(self._past_qpos[-1], self._past_qpos[0])
+
+
+Bodies = PointMasses | Robots

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from rebody import inputs
 from rebody.bodies.camera import Camera
 from rebody.envs.bodies import Bodies
-from rebody.errors import RebodyError
+from rebody.errors import RebodyError, unknown
 from rebody.jax_settings import own_jax_settings
 from rebody.tasks import BaseTask, RewardForm, TaskDistribution, family_index, family_names, reward
 from rebody.types import GLOBAL_FIELDS, AnyArray, GlobalState, Task
@@ -128,5 +128,5 @@ def task_of_options(options: Any) -> Task | None:
 def _form(name: str) -> RewardForm:
     known = get_args(RewardForm)
     if name not in known:
-        raise RebodyError(f"unknown reward '{name}'; choose one of {', '.join(known)}.")
+        raise unknown("reward", name, known)
     return cast(RewardForm, name)

@@ -52,7 +52,7 @@ def _reached(axes: Axes, run: BeliefOverTime, family: Family) -> None:
     shown = [*reached, *usual, 0.0]
     margin = 0.1 * max(np.ptp(shown), family.tolerance)
     axes.set(ylabel=COLUMNS[family.quantity.name], ylim=(min(shown) - margin, max(shown) + margin))
-    axes.legend(frameon=False, fontsize=8, loc="upper right")
+    axes.legend(loc="upper right")
 
 
 def _reward(axes: Axes, run: BeliefOverTime) -> None:
@@ -65,7 +65,7 @@ def _probabilities(axes: Axes, run: BeliefOverTime) -> None:
         shares = [reading.probabilities[family] for reading in run.readings]
         axes.plot(run.time_s, shares, color=_colour(family), label=family)
     axes.set(ylabel="probability", ylim=(-0.03, 1.03), xlabel="time [s]")
-    axes.legend(frameon=False, fontsize=8, loc="center right")
+    axes.legend(loc="center right")
 
 
 def _latent(axes: Axes, run: BeliefOverTime) -> None:
@@ -81,7 +81,6 @@ def _latent(axes: Axes, run: BeliefOverTime) -> None:
     axes.set(
         xlabel="latent 1" if is_plane else "time [s]", ylabel="latent 2" if is_plane else "latent", title="the latent"
     )
-    axes.legend(frameon=False, fontsize=8)
 
 
 def _clusters(axes: Axes, run: BeliefOverTime) -> None:
@@ -90,7 +89,7 @@ def _clusters(axes: Axes, run: BeliefOverTime) -> None:
         if shares.max() > 0.5:  # of many, those that it ever belonged to
             axes.plot(run.time_s, shares, next(lines), color=TRUTH, label=f"cluster {k}")
     axes.set(xlabel="time [s]", ylabel="responsibility", ylim=(-0.03, 1.03), title="clusters found without labels")
-    axes.legend(frameon=False, fontsize=8, loc="center right")
+    axes.legend(loc="center right")
 
 
 def _colour(family: str) -> str:

@@ -21,6 +21,5 @@ def plot_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
             for agent, results in diagnosis.results.items():
                 draw_errors(axes, results.of(family.name), label=agent, color=COLOURS[agent])
             axes.set(xlabel=f"{family.name}: final error [{family.unit}]", ylabel="episodes [%]")
-            axes.legend(frameon=False)
         reuse = diagnosis.results["reuse"]
         drawing.suptitle(f"'{as_text(reuse.inference)}' on {as_text(reuse.robot)}: which part lost what")

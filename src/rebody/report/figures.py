@@ -90,7 +90,6 @@ def _kinds(axes: Axes, results: Results) -> None:
         final = np.array([episode.latent[-1] for episode in results.of(family)])
         axes.plot(final[:, 0], final[:, 1], ".", color=colour, label=family)
     axes.set(xlabel="latent 1", ylabel="latent 2", title="the belief at the end: what kind of task")
-    axes.legend(frameon=False)
 
 
 def _latents(axes: Axes, results: Results) -> None:
@@ -101,7 +100,6 @@ def _latents(axes: Axes, results: Results) -> None:
         axes.plot(targets, final[:, dimension], ".", label=f"latent {dimension + 1}")
     unit = _unit(results.episodes[0].active_family[-1])
     axes.set(xlabel=f"hidden target [{unit}]", ylabel="latent mean", title="the belief at the end")
-    axes.legend(frameon=False)
 
 
 def draw_readings(axes: Axes, results: Results) -> None:
@@ -113,7 +111,6 @@ def draw_readings(axes: Axes, results: Results) -> None:
         axes.plot(truth, read, "o", color=colour, mfc="none", label=f"{family} [{_unit(family)}]")
     axes.axline((0, 0), slope=1, color=TRUTH, lw=0.7)
     axes.set(xlabel="hidden target", ylabel="read from the belief", title="the belief at the end: how much")
-    axes.legend(frameon=False)
 
 
 def _errors(axes: Axes, agents: dict[str, list[EpisodeResult]], family: str) -> None:
@@ -125,7 +122,7 @@ def _errors(axes: Axes, agents: dict[str, list[EpisodeResult]], family: str) -> 
         ylabel="episodes with at most this error [%]",
         title="what inference brings",
     )
-    axes.legend(frameon=False, loc="upper center")
+    axes.legend(loc="upper center")
 
 
 def draw_errors(axes: Axes, episodes: list[EpisodeResult], **style: Any) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import safetensors.numpy
 from safetensors import SafetensorError
 
-from rebody.errors import RebodyError, did_you_mean
+from rebody.errors import RebodyError, unknown
 from rebody.store.checkpoint import holds_checkpoint
 from rebody.store.files import DATA, TEXT, output_file, read_file, reason
 from rebody.store.files import WEIGHTS as LARGEST_WEIGHTS
@@ -89,8 +89,8 @@ def load_artifact(reference: str | Path, kind: str | None = None) -> Artifact:
     manifest, content = _read_all(path)
     if kind not in (None, manifest["kind"]):
         raise RebodyError(
-            f"{reference} is an artifact of kind {manifest['kind']!r}; one of kind {kind!r} is needed here. "
-            + _shipped_of(kind)
+            f"{reference} is an artifact of kind {manifest['kind']!r}; one of kind {kind!r} is needed here, such as "
+            f"{', '.join(_names_of(kind)) or 'one of your own'}."
         )
     return Artifact(
         name=os.path.basename(os.path.abspath(reference)),
@@ -159,22 +159,12 @@ def _find(reference: str | Path, kind: str | None) -> Path:
     folder = Path(os.path.abspath(reference))
     if folder.is_dir():
         return folder
-    raise RebodyError(_unknown(str(reference), kind))
-
-
-def _unknown(reference: str, kind: str | None) -> str:
-    guess = did_you_mean(reference, _names_of(kind))
-    return f"no artifact or folder called {reference!r}.{guess} {_shipped_of(kind)}"
+    what = "artifact" if kind is None else f"{kind} artifact"
+    raise unknown(what, reference, _names_of(kind), "or a folder of your own")
 
 
 def _names_of(kind: str | None) -> list[str]:
     return [name for name, of_kind in shipped_artifacts() if kind in (None, of_kind)]
-
-
-def _shipped_of(kind: str | None) -> str:
-    names = ", ".join(_names_of(kind)) or "none"
-    of_kind = "" if kind is None else f" of kind {kind!r}"
-    return f"Shipped artifacts{of_kind}: {names}. Give one of these, or a folder of your own."
 
 
 def _read_all(path: Path) -> tuple[dict[str, Any], dict[str, bytes]]:

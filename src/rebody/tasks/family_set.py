@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
-from rebody.errors import RebodyError, did_you_mean
+from rebody.errors import unknown
 from rebody.ranges import Box
 from rebody.tasks.family import Family, Settle
 from rebody.tasks.quantities import length, wrapped_where
@@ -69,8 +69,7 @@ class FamilySet:
         """RebodyError if there is no family of that name."""
         if name in self.names:
             return self.names.index(name)
-        known = ", ".join(self.names)
-        raise RebodyError(f"unknown task family '{name}'.{did_you_mean(name, self.names)} Families are: {known}.")
+        raise unknown("family", name, self.names)
 
     def named(self, name: str) -> Family:
         """RebodyError if there is none of that name."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rebody.errors import RebodyError, did_you_mean
+from rebody.errors import RebodyError, unknown
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,4 @@ def law_named(name: str) -> RewardLaw:
     """RebodyError if there is none of that name."""
     if name in LAWS:
         return LAWS[name]
-    raise RebodyError(
-        f"unknown reward law '{name}'.{did_you_mean(name, LAWS)} Laws are: {', '.join(LAWS)}. "
-        "One from a file of your own must be named: --families FILE."
-    )
+    raise unknown("law", name, LAWS, "those of your own file, named by --families FILE")

@@ -1,13 +1,11 @@
 """A body that is watched: a robot or a point mass, stepped by what its agent says."""
 
-from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import replace
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
@@ -17,52 +15,11 @@ from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.toy_models import toy_model
 from rebody.bodies.toys import Toy, ToyState
-from rebody.types import DECISION_DT, Belief, GlobalState
+from rebody.types import Belief, GlobalState
 
 
-class Body(ABC):
-    """One body; arrays of global states have the shape [1], since agents decide for many."""
-
-    model: mujoco.MjModel
-    """What is drawn."""
-    x_address: int
-    """Where x stands in qpos."""
-    steps_per_decision: int
-
-    @property
-    def step_s(self) -> float:
-        """Seconds of one step."""
-        return DECISION_DT / self.steps_per_decision
-
-    @property
-    @abstractmethod
-    def qpos(self) -> Float[np.ndarray, " nq"]:
-        """A copy of the model's joint positions [m, rad]."""
-
-    @abstractmethod
-    def reset(self, seed: int) -> None:
-        """Put it at x = 0 at rest, with its reset noise."""
-
-    @abstractmethod
-    def step(self, command: Command, belief: Belief) -> None:
-        """One step under a command; only a policy without hierarchy looks at the belief."""
-
-    @abstractmethod
-    def push(self, change: float) -> None:
-        """Change the velocity of its centre of mass along x [m/s]."""
-
-    @abstractmethod
-    def observe(self) -> GlobalState:
-        """The body-neutral readout; velocities are means over the last 0.1 s."""
-
-    @property
-    @abstractmethod
-    def has_fallen(self) -> bool:
-        """Whether it lies on the ground."""
-
-
-class RobotBody(Body):
-    """A robot under its controller. A step is a control step."""
+class RobotBody:
+    """A robot under its controller. A step is a control step; global states have the shape [1]."""
 
     def __init__(self, spec: RobotSpec, controller: Controller):
         self.model, self.steps_per_decision = spec.model, spec.steps_per_decision
@@ -72,39 +29,39 @@ class RobotBody(Body):
         self._trail: deque[Float[np.ndarray, "1 nq"]] = deque(maxlen=spec.steps_per_decision + 1)  # over the last 0.1 s
 
     @property
-    def qpos(self):
-        """A copy of the joint positions."""
+    def qpos(self) -> Float[np.ndarray, " nq"]:
+        """A copy of the model's joint positions [m, rad]."""
         return self._batch.qpos[0].copy()
 
-    def reset(self, seed):
-        """In the rest pose, with Gymnasium's reset noise."""
+    def reset(self, seed: int) -> None:
+        """In the rest pose at x = 0, with Gymnasium's reset noise."""
         self._batch.reset(np.random.default_rng(seed))
         self._trail.clear()
         self._trail.append(self._batch.qpos.copy())
 
-    def step(self, command, belief):
-        """The tracker follows the subgoal."""
+    def step(self, command: Command, belief: Belief) -> None:
+        """One control step towards the subgoal; only a policy without hierarchy looks at the belief."""
         follow(self._controller, self._batch, command.subgoal, belief)
         self._trail.append(self._batch.qpos.copy())
 
-    def push(self, change):
-        """Every part's velocity changes alike."""
+    def push(self, change: float) -> None:
+        """Change every part's velocity along x alike [m/s]."""
         self._batch.push(np.array([change]))
 
-    def observe(self):
-        """By the robot's observation mapping."""
+    def observe(self) -> GlobalState:
+        """By the robot's observation mapping; velocities are means over the last 0.1 s."""
         return self._batch.spec.observe(self._trail[-1], self._trail[0])
 
     @property
-    def has_fallen(self):
-        """As its description defines it."""
+    def has_fallen(self) -> bool:
+        """Whether it lies on the ground, as its description defines it."""
         return bool(self._batch.fallen[0])
 
 
-class ToyBody(Body):
+class ToyBody:
     """A nominal point mass, which takes the agent's action itself. A step is a decision."""
 
-    x_address, steps_per_decision = 0, 1
+    x_address, steps_per_decision, has_fallen = 0, 1, False
 
     def __init__(self, toy: Toy):
         self.model = toy_model(toy)
@@ -112,33 +69,31 @@ class ToyBody(Body):
         self.reset(0)
 
     @property
-    def qpos(self):
+    def qpos(self) -> Float[np.ndarray, " nq"]:
         """x, and for a toy that has them z and pitch."""
         state = self._state
         return np.concatenate([state.x, state.z, state.pitch], dtype=float)[: self.model.nq]
 
-    def reset(self, seed):
-        """It has no noise."""
+    def reset(self, seed: int) -> None:
+        """At x = 0 at rest, whatever the seed."""
         still = jnp.zeros(1)
         self._state = self._toy.initial(still, still)
 
-    def step(self, command, belief):
+    def step(self, command: Command, belief: Belief) -> None:
         """One decision of the toy."""
         self._state = _advance(self._toy, self._state, command)
 
-    def push(self, change):
-        """A position toy, which moves by steps and has no momentum, does not mind."""
+    def push(self, change: float) -> None:
+        """Change its velocity along x [m/s]; a position toy, which has no momentum, does not mind."""
         state = self._state
         self._state = replace(state, vx=state.vx + change, drift=state.drift + change)
 
-    def observe(self):
+    def observe(self) -> GlobalState:
         """The toy's own readout."""
         return self._toy.observe(self._state)
 
-    @property
-    def has_fallen(self):
-        """Never."""
-        return False
+
+Body = RobotBody | ToyBody
 
 
 @eqx.filter_jit

@@ -49,13 +49,6 @@ class Offered:
 
 
 @dataclass(frozen=True)
-class GiveTask:
-    """Another hidden task from now on."""
-
-    task: TaskSpec
-
-
-@dataclass(frozen=True)
 class Push:
     """A change of velocity [m/s]."""
 
@@ -67,14 +60,8 @@ class Restart:
     """Back to the start."""
 
 
-@dataclass(frozen=True)
-class Refused:
-    """What a browser sent is not offered."""
-
-    why: str
-
-
-Order = Choice | GiveTask | Push | Restart | Refused
+Order = Choice | TaskSpec | Push | Restart | RebodyError
+"""A task is given from now on; an error says why what a browser sent is refused."""
 
 
 class Controls:
@@ -148,8 +135,8 @@ class Controls:
         self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
 
     def _connect(self) -> None:
-        self._give.on_click(self._ordering(lambda _: GiveTask(self._chosen_task())))
-        self._draw.on_click(self._ordering(lambda _: GiveTask(self._any_task())))
+        self._give.on_click(self._ordering(lambda _: self._chosen_task()))
+        self._draw.on_click(self._ordering(lambda _: self._any_task()))
         self._pushes.on_click(self._ordering(lambda event: _push(event.target.value)))
         self._restart.on_click(self._ordering(lambda _: Restart()))
         self._pause.on_click(lambda _: self.pause(not self.paused))
@@ -164,7 +151,7 @@ class Controls:
             try:
                 made = order(event)
             except RebodyError as error:
-                made = Refused(str(error))
+                made = error
             if made is not None:
                 self.orders.put(made)
 

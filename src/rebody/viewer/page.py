@@ -12,7 +12,7 @@ from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import Trial
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
-from rebody.viewer.controls import Choice, Controls, GiveTask, Offered, Order, Push, Refused, Restart
+from rebody.viewer.controls import Choice, Controls, Offered, Order, Push, Restart
 from rebody.viewer.pace import Pace
 from rebody.viewer.panel import BeliefPanel
 from rebody.viewer.scene import Scene
@@ -77,7 +77,7 @@ class Page:
 
     def _begin(self) -> None:
         """What is remembered of an episode, at its start."""
-        self._pace = Pace(self.session.body.step_s, time.monotonic())
+        self._pace = Pace(self.session.step_s, time.monotonic())
         self._seen: tuple[Moment | None, TaskSpec] | None = None
         self._drawn: Moment | None = None
         self._latent_due = 0.0
@@ -96,16 +96,16 @@ class Page:
         match order:
             case Choice():
                 self._change_to(order)
-            case GiveTask(task):
-                self.session.set_task(task)
-                self.controls.show_task(self.session.trial, task)
+            case TaskSpec():
+                self.session.set_task(order)
+                self.controls.show_task(self.session.trial, order)
             case Push(change):
                 self.session.push(change)
             case Restart():
                 self.session.restart()
                 self._begin()
-            case Refused(why):
-                raise RebodyError(why)
+            case RebodyError():
+                raise order
 
     def _change_to(self, choice: Choice) -> None:
         self.controls.show_status(words.loading(choice.robot))

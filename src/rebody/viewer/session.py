@@ -47,11 +47,9 @@ class Session:
         self.trial = trial
         self.moments: deque[Moment] = deque(maxlen=round(REMEMBERED_S / DECISION_DT))
         self.set_task(task)
-        self.body: Body
-        if trial.robot is None:
-            self.body = ToyBody(trial.inference.toy)
-        else:
-            self.body = RobotBody(trial.robot, trial_controller(trial))
+        robot, toy = trial.robot, trial.inference.toy
+        self.body: Body = RobotBody(robot, trial_controller(trial)) if robot else ToyBody(toy)
+        self.step_s = DECISION_DT / self.body.steps_per_decision
         self.restart()
         for _ in range(self.body.steps_per_decision):
             self.step()
@@ -68,7 +66,7 @@ class Session:
         self.moments.clear()
 
     def step(self) -> None:
-        """One step of the body, which takes `body.step_s`; every 0.1 s a decision follows."""
+        """One step of the body, which takes `step_s`; every 0.1 s a decision follows."""
         self.body.step(self._command, self._carry.belief)
         self.previous_pose, self.pose = self.pose, self.body.qpos
         self._steps += 1
@@ -78,7 +76,7 @@ class Session:
     @property
     def time_s(self) -> float:
         """Simulated seconds since the start."""
-        return self._steps * self.body.step_s
+        return self._steps * self.step_s
 
     def set_task(self, task: TaskSpec) -> None:
         """Another hidden task from now on; only the oracle is told. RebodyError if the module cannot infer it

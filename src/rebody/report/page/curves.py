@@ -13,6 +13,7 @@ from rebody.report.page.log import LARGEST, Log
 from rebody.report.style import as_text
 from rebody.tasks import FAMILIES
 
+Limits = tuple[float | None, float | None]
 SPARSE = 0.25
 """What is measured in a smaller share of iterations is drawn with dots."""
 
@@ -27,37 +28,32 @@ class Panel:
     columns: dict[str, str]
     """Of the log: what the legend calls each."""
     scale: str = "linear"
-    limits: tuple[float | None, float | None] = (None, None)
+    limits: Limits = (None, None)
 
 
-def _policies(column: str) -> dict[str, str]:
-    return {column: "policy", f"told/{column}": "policy that is told the task"}
+def _policies(title: str, axis: str, column: str, scale: str = "linear") -> Panel:
+    return Panel(title, axis, {column: "policy", f"told/{column}": "policy that is told the task"}, scale)
 
 
-_R2 = {f"evaluation/{family.name} R2": family.name for family in FAMILIES}
+def _errors(title: str, unit: str, median: str, p95: str) -> Panel:
+    columns = {f"evaluation/{median}": "median", f"evaluation/{p95}": "95th percentile"}
+    return Panel(title, f"error [{unit}]", columns, "log")
 
+
+def _mixture(title: str, axis: str, *columns: str, limits: Limits = (None, None)) -> Panel:
+    return Panel(title, axis, {f"mixture/{column.lower()}": column for column in columns}, limits=limits)
+
+
+LEARNING, HELD_OUT, SHARE = "while it learns", "held out", (0.0, 1.03)
 PANELS = (
-    *(
-        Panel(
-            f"final error: {family.name}",
-            f"error [{family.unit}]",
-            {f"evaluation/{family.name} median": "median", f"evaluation/{family.name} p95": "95th percentile"},
-            "log",
-        )
-        for family in FAMILIES
-    ),
-    Panel(
-        "final error",
-        "error [unit of the family]",
-        {"evaluation/median error": "median", "evaluation/p95 error": "95th percentile"},
-        "log",
-    ),
+    *(_errors(f"final error: {f.name}", f.unit, f"{f.name} median", f"{f.name} p95") for f in FAMILIES),
+    _errors("final error", "unit of the family", "median error", "p95 error"),
     Panel("told to stand still", "speed [m/s]", {"evaluation/zero speed": "mean speed"}, "log"),
     Panel(
         "return",
         "return of an episode",
         {
-            "return": "while it learns",
+            "return": LEARNING,
             "evaluation/return": "held-out tasks",
             "evaluation/oracle return": "held-out tasks, told",
         },
@@ -65,7 +61,7 @@ PANELS = (
     Panel(
         "reward",
         "mean reward",
-        {"reward": "while it learns", "task_reward": "of the task, while it learns", "evaluation/reward": "held out"},
+        {"reward": LEARNING, "task_reward": f"of the task, {LEARNING}", "evaluation/reward": HELD_OUT},
     ),
     Panel(
         "shares of episodes",
@@ -75,54 +71,36 @@ PANELS = (
             "evaluation/base task later": "base task right, later",
             "evaluation/fell": "fell",
         },
-        limits=(0.0, 1.03),
+        limits=SHARE,
     ),
-    Panel(
-        "falls",
-        "falls per minute",
-        {"falls_per_minute": "while it learns", "evaluation/falls per minute": "held out"},
-    ),
-    Panel("falls under a subgoal", "share of subgoals", {"falls": "while it learns"}),
+    Panel("falls", "falls per minute", {"falls_per_minute": LEARNING, "evaluation/falls per minute": HELD_OUT}),
+    Panel("falls under a subgoal", "share of subgoals", {"falls": LEARNING}),
     Panel(
         "targets read from the latent by a linear probe",
         "R²",
-        {"evaluation/target R2": "target", **_R2},
-        limits=(0.0, 1.03),
+        {"evaluation/target R2": "target", **{f"evaluation/{family.name} R2": family.name for family in FAMILIES}},
+        limits=SHARE,
     ),
     Panel("reward that the decoder predicts", "error [unit of the reward]", {"reward_error": "error"}, "log"),
     Panel("state that the decoder predicts", "error [normalised]", {"state_error": "error"}, "log"),
     Panel("belief against prior", "KL divergence [nats]", {"kl": "KL divergence"}, "log"),
-    Panel(
-        "clusters",
-        "number",
-        {
-            "mixture/components": "components",
-            "mixture/births": "births",
-            "mixture/merges": "merges",
-            "mixture/deletes": "deletes",
-        },
-    ),
-    Panel(
-        "clusters against base tasks",
-        "agreement",
-        {"mixture/purity": "purity", "mixture/ari": "ARI", "mixture/nmi": "NMI"},
-        limits=(0.0, 1.03),
-    ),
-    Panel("the mixture's bound", "ELBO of a belief [nats]", {"mixture/elbo": "ELBO"}),
+    _mixture("clusters", "number", "components", "births", "merges", "deletes"),
+    _mixture("clusters against base tasks", "agreement", "purity", "ARI", "NMI", limits=SHARE),
+    _mixture("the mixture's bound", "ELBO of a belief [nats]", "ELBO"),
     Panel("classifier", "cross-entropy [nats]", {"cross_entropy": "cross-entropy"}, "log"),
     Panel(
         "how long a subgoal is held",
         "control steps",
         {
-            "steps": "while it learns",
-            **{f"evaluation/control steps, {family.name}": f"held out, {family.name}" for family in FAMILIES},
+            "steps": LEARNING,
+            **{f"evaluation/control steps, {family.name}": f"{HELD_OUT}, {family.name}" for family in FAMILIES},
         },
     ),
-    Panel("subgoals reached", "error / subgoal", {"evaluation/relative error": "held out"}),
-    Panel("value", "discounted return", _policies("value")),
-    Panel("critics", "loss", _policies("critic_loss"), "log"),
-    Panel("entropy of actions", "entropy [nats]", _policies("entropy")),
-    Panel("temperature", "temperature", _policies("temperature"), "log"),
+    Panel("subgoals reached", "error / subgoal", {"evaluation/relative error": HELD_OUT}),
+    _policies("value", "discounted return", "value"),
+    _policies("critics", "loss", "critic_loss", "log"),
+    _policies("entropy of actions", "entropy [nats]", "entropy"),
+    _policies("temperature", "temperature", "temperature", "log"),
 )
 LEFT_OUT = ("iteration", "actor_loss", "told/actor_loss")
 """The axis, and what tells nothing beside entropy and value."""
@@ -151,13 +129,12 @@ def _draw(each: Panel, log: Log, axes: Axes) -> None:
         if there.any():
             style = "o-" if there.mean() < SPARSE or there.sum() == 1 else "-"
             points = iteration[there], log[column][there]
-            axes.plot(*points, style, ms=3.5, lw=1.3, color=next(colours), label=label)
+            said = None if label == each.axis else label
+            axes.plot(*points, style, ms=3.5, lw=1.3, color=next(colours), label=said)
     begin = min(0.0, iteration[0])
     axes.set(title=each.title, xlabel="iteration")
     axes.set(xlim=(begin, begin + 1.02 * (iteration[-1] - begin or 1.0)))
     axes.set(ylabel=each.axis, yscale=each.scale, ylim=each.limits)
-    if list(each.columns.values()) != [each.axis]:  # which says it already
-        axes.legend(frameon=False, fontsize=8)
 
 
 def _there(log: Log, column: str, scale: str) -> np.ndarray:

@@ -1,16 +1,13 @@
-"""What figures are drawn from: named arrays, out of training logs and of episodes."""
+"""What figures are drawn from: named arrays."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import safetensors.numpy
 
 from rebody.evaluation.evaluate import Trial, check_trial, run_trial, start_seeds, trial_agent
-from rebody.store import load_artifact
 from rebody.store.files import written_whole
 from rebody.tasks.task_file import TaskSpec, active_tasks
-from rebody.training.run import read_log
 from rebody.types import DECISION_DT
 
 Data = dict[str, np.ndarray]
@@ -20,29 +17,15 @@ POINTS = 400
 """Points of a trajectory that are kept, at most."""
 
 
-def shipped(number: str) -> Callable[[], Data]:
+def shipped(number: str) -> Data:
     """The log of a figure that lies in the package."""
-    return lambda: safetensors.numpy.load_file(LOGS / f"{number}.safetensors")
+    return safetensors.numpy.load_file(LOGS / f"{number}.safetensors")
 
 
 def save(data: Data, path: Path) -> None:
     """Write a log."""
     with written_whole(path) as unfinished:
         safetensors.numpy.save_file({name: np.array(array, order="C") for name, array in data.items()}, unfinished)
-
-
-def training_log(artifact: str | Path, kind: str) -> Data:
-    """What the training of an artifact measured: an array per column, NaN where it measured nothing.
-
-    `steps` counts steps of the toy or control steps of the robots.
-    """
-    loaded = load_artifact(artifact, kind)
-    data = {name: column.astype(np.float32) for name, column in read_log(loaded.log).items()}
-    settings = loaded.config["training"]
-    per_iteration = (
-        settings["episodes"] * settings["decisions"] if kind == "inference" else settings["robots"] * settings["steps"]
-    )
-    return data | {"steps": data["iteration"] * per_iteration}
 
 
 def on_goals(trial: Trial, targets: np.ndarray) -> Data:
