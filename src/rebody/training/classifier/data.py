@@ -20,7 +20,6 @@ from rebody.store import Artifact
 from rebody.tasks import TaskDistribution, achieved_by_way_of
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
-DECISIONS = 200
 KNOWN_FROM = 20
 """Decisions after which a belief counts in judging slots: before them little is known."""
 HOLD = 5
@@ -41,10 +40,10 @@ class ToyWorld:
         said = {name: training[name] for name in ("tasks", "randomisation") if name in training}
         return understood(said, cls, module.name)
 
-    def draw(self, key: PRNGKeyArray, episodes: int, switch_share: float, *, disturbed: bool):
+    def draw(self, key: PRNGKeyArray, episodes: int, decisions: int, switch_share: float, *, disturbed: bool):
         """Active tasks [time, episode], and how each episode's toy departs from the nominal one."""
         task_key, disturbance_key = jax.random.split(key)
-        tasks = self.tasks.sample_episodes(task_key, episodes, DECISIONS, switch_share)
+        tasks = self.tasks.sample_episodes(task_key, episodes, decisions, switch_share)
         rough = self.randomisation.sample(disturbance_key, (episodes,))
         return jax.tree.map(lambda leaf: leaf.T, tasks), rough if disturbed else no_disturbance((episodes,))
 

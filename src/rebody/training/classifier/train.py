@@ -56,7 +56,7 @@ def train_classifier(
         seen = listen(module, world, config, jax.random.fold_in(key, 2**31 - 1))
         state = run.restore(initial_state(module, config, key))
         state = run.loop(state, lambda state: iterate(state, seen, config, key), config.iterations, "classifier")
-        return save_slots(state.classifier, module, world, config, run, seed)
+        return save_slots(state.classifier, module, world, config, run)
 
 
 def iterate(state: RunState, seen: Beliefs, config: ClassifierConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
@@ -70,7 +70,11 @@ def listen(module: Inference, world: ToyWorld, config: ClassifierConfig, key: PR
     parts = []
     for i, disturbed in enumerate((False, True)):
         tasks, disturbance = world.draw(
-            jax.random.fold_in(key, i), config.episodes // 2, config.switch_share, disturbed=disturbed
+            jax.random.fold_in(key, i),
+            config.episodes // 2,
+            config.decisions,
+            config.switch_share,
+            disturbed=disturbed,
         )
         parts.append((act(module, tasks, disturbance).belief, tasks.family))
     belief, family = jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=1), *parts)

@@ -4,25 +4,14 @@ from dataclasses import dataclass, field
 
 from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
-from rebody.ranges import Copies, Count, Decisions, Number, Rows
+from rebody.ranges import Decisions
+from rebody.training.off_policy import OffPolicyConfig
 
 
-@dataclass(frozen=True)
-class FlatConfig:
+@dataclass(frozen=True, kw_only=True)
+class FlatConfig(OffPolicyConfig):
     """One training run of a flat policy; robots, steps and updates are a tracker's."""
 
-    robots: Copies = 64
-    """Copies that move in parallel."""
-    steps: Copies = 32
-    """Control steps of each robot in an iteration."""
-    updates: Count = 256
-    """Updates in an iteration."""
-    iterations: Number = 700
-    """Length of the run."""
-    evaluate_every: Count = 50
-    """Iterations from one measurement on held-out tasks to the next."""
-    replay: Rows = 500_000
-    """Transitions kept."""
     decisions: Decisions = 200
     """Length of an episode: 20 s, as long as it will be used."""
     reward: TrackerReward = field(default_factory=TrackerReward)

@@ -1,6 +1,5 @@
 """What a flat policy reaches on hidden tasks, and the artifact that it leaves behind."""
 
-from dataclasses import asdict
 from pathlib import Path
 
 from rebody.agents.build import build_agent
@@ -9,31 +8,27 @@ from rebody.agents.controller import FlatController
 from rebody.agents.parts import Inference
 from rebody.bodies import RobotSpec
 from rebody.control.flat import FlatPolicy
-from rebody.store import save_artifact, tree_hash
-from rebody.training.card import card
+from rebody.store import tree_hash
+from rebody.training.card import save
 from rebody.training.flat.config import FlatConfig
 from rebody.training.held_out import act, figures_of, rows_of
-from rebody.training.minds import tasks_within
 from rebody.training.run import Run
-
-TASKS = 100
-"""Held-out tasks."""
-DECISIONS = 200
+from rebody.training.task_inference import tasks_within
 
 
-def measure(policy: FlatPolicy, module: Inference, spec: RobotSpec) -> dict[str, float]:
+def measure(policy: FlatPolicy, module: Inference, spec: RobotSpec, config: FlatConfig) -> dict[str, float]:
     """Final error on held-out tasks of each family, return, share that fell."""
     controller = FlatController(policy, module.parts.module.decoder)
-    tasks = tasks_within(module, spec.reach)
-    agent, form = build_agent("flat", module), module.contract.reward
-    return figures_of(*act(agent, controller, spec, tasks, form, (DECISIONS, TASKS)))
+    agent, tasks, form = build_agent("flat", module), tasks_within(module, spec.reach), module.contract.reward
+    return figures_of(*act(agent, controller, spec, tasks, form, config.held_out, config.held_out_s))
 
 
-def save_flat(policy: FlatPolicy, module: Inference, spec: RobotSpec, config: FlatConfig, run: Run, seed: int) -> Path:
-    """Measure, write artifact and card."""
-    figures = measure(policy, module, spec)
+def save_flat(
+    policy: FlatPolicy, figures: dict[str, float], module: Inference, spec: RobotSpec, config: FlatConfig, run: Run
+) -> Path:
+    """Write artifact and card."""
     actor = policy.actor
-    stored = FlatSettings(
+    settings = FlatSettings(
         robot=spec.name,
         inference=module.name,
         inference_hash=tree_hash(module.parts.module),
@@ -43,14 +38,12 @@ def save_flat(policy: FlatPolicy, module: Inference, spec: RobotSpec, config: Fl
         actions=actor.actions,
         hidden=config.sac.hidden,
         projections=config.sac.projections,
-        training=asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
+        training=run.training(config),
     )
-    condition = f"{TASKS} held-out tasks, 20 s"
-    rows = rows_of(figures, condition)
     steps = run.iterations * config.steps * config.robots
     what = (
         f"Flat policy of '{spec.name}': (joint state, x, belief of '{module.name}') -> joint action, without "
         f"subgoals. Trained on {steps:,} control steps with {run.iterations * config.updates:,} updates."
     )
-    text = card(f"Flat policy: {spec.name}", what, run, seed, rows)
-    return save_artifact(run.out, kind="flat", config=asdict(stored), weights=policy, card=text, log=run.log)
+    rows = rows_of(figures, config.held_out, config.held_out_s)
+    return save("flat", settings, policy, run, f"Flat policy: {spec.name}", what, rows)

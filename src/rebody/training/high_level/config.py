@@ -5,14 +5,13 @@ from dataclasses import dataclass, field, replace
 from rebody.control.high_level import high_level_sac
 from rebody.control.sac import SACConfig
 from rebody.ranges import Copies, Count, Decisions, NotNegative, Number, Positive, Rows
+from rebody.training.off_policy import OffPolicyConfig
 
 
-@dataclass(frozen=True)
-class HighLevelConfig:
+@dataclass(frozen=True, kw_only=True)
+class HighLevelConfig(OffPolicyConfig):
     """One training run of a high-level policy."""
 
-    robots: Copies = 64
-    """Copies that move in parallel."""
     steps: Copies = 25
     """Decisions of each robot in an iteration."""
     updates: Count = 512

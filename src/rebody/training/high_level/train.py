@@ -4,53 +4,32 @@ The module that believes and the tracker that moves the joints are frozen; what 
 asks for. A step of its decision process is a decision of 0.1 s, its reward the task's own: nobody tells it the task.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Bool, Float, Int, PRNGKeyArray
+from jaxtyping import Bool, Float, PRNGKeyArray
 
 from rebody.agents.build import check_robot_of
 from rebody.agents.controller import TrackerController
 from rebody.agents.parts import Inference, LoadedTracker, load_high_level, load_inference, load_tracker
 from rebody.agents.rollout import follow
-from rebody.bodies import RobotBatch, RobotSpec, load_robot
-from rebody.bodies.check import require_ready
-from rebody.control import sac
+from rebody.bodies import RobotBatch
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.slot_policy import SlotPolicy, Slots, draw, judge, slot_sac, slots_within, subgoal_of
 from rebody.jax_settings import own_jax_settings
-from rebody.ranges import check_ranges
 from rebody.training.arrival import arrival_bonus
 from rebody.training.high_level.config import HighLevelConfig
 from rebody.training.high_level.report import measure, save_high_level
-from rebody.training.minds import Minds, listen, new_minds, put_on_feet
-from rebody.training.ring import draw as draw_rows
-from rebody.training.ring import write
+from rebody.training.motion import decision, put_on_feet
+from rebody.training.off_policy import Learner, OffPolicyState, learn, ready_robot, train
 from rebody.training.run import Metrics, Run
-from rebody.training.transitions import learn, no_transitions
-from rebody.types import AnyArray, GlobalState, Subgoal
-
-
-@dataclass(frozen=True)
-class Frozen:
-    """What does not learn."""
-
-    module: Inference
-    controller: TrackerController
-    slots: Slots
-
-
-class RunState(eqx.Module):
-    """Everything that a resumed run needs; host arrays are written in place."""
-
-    sac: SACState
-    replay: SACBatch  # a ring of decisions in host memory, written in place
-    minds: Minds
-    physics: Float[np.ndarray, "robot state"]
-    iteration: Int[np.ndarray, ""]
+from rebody.training.task_inference import TaskInference, begin_tasks, infer
+from rebody.types import AnyArray, GlobalState
 
 
 @own_jax_settings()
@@ -71,94 +50,96 @@ def train_high_level(
     RebodyError if the robot is not ready, `out` holds another run, or module, tracker and robot do not fit; Interrupted
     on Ctrl-C.
     """
-    check_ranges(config)
-    spec, module = load_robot(robot), load_inference(inference)
-    require_ready(spec)
+    spec, module = ready_robot(robot, config), load_inference(inference)
     loaded = load_tracker(f"tracker-{spec.name}" if tracker is None else tracker)
     check_robot_of(loaded, spec)
     module.contract.check_body(spec.name, spec.moving_fields, loaded.tracker.slots)
-    settings = {"robot": robot, "inference": inference, "tracker": tracker, "seed": seed, "init_from": init_from}
-    with Run(out, asdict(config) | settings, resume=resume, finish=finish) as run:
-        batch, frozen = RobotBatch(spec, config.robots), freeze(module, loaded, spec)
-        batch.reset(np.random.default_rng((seed, 1)))
-        state = run.restore(initial_state(config, batch, frozen, jax.random.key(seed), init_from))
-        batch.state = state.physics
-        state = run.loop(
-            state, lambda state: iterate(state, batch, frozen, config, seed), config.iterations, "high level"
-        )
-        return save_high_level(slot_policy(state, frozen), module, loaded, spec, config, run, seed)
+    settings = {"robot": robot, "inference": inference, "tracker": tracker, "seed": seed}
+    learner = HighLevelLearner(spec, config, module, loaded)
+    return train(learner, out, settings, resume=resume, finish=finish, init_from=init_from)
 
 
-def iterate(
-    state: RunState, batch: RobotBatch, frozen: Frozen, config: HighLevelConfig, seed: int
-) -> tuple[RunState, Metrics]:
-    """Move the robots, learn from the replay, now and then evaluate."""
-    iteration = int(state.iteration)
-    rng = np.random.default_rng((seed, 2, iteration))
-    collect_key, learn_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration))
-    minds, metrics = collect(state, batch, frozen, config, rng, collect_key)
-    written = (iteration + 1) * config.steps * config.robots
-    transitions = draw_rows(state.replay, written, (config.updates, config.sac.batch_size), rng)
-    policy, learned = learn(state.sac, transitions, learn_key, slot_sac(config.sac, len(frozen.slots)), judge)
-    state = eqx.tree_at(
-        lambda s: (s.sac, s.minds, s.physics, s.iteration),
-        state,
-        (policy, minds, batch.state, state.iteration + 1),
-    )
-    metrics |= learned
-    if (iteration + 1) % config.evaluate_every == 0:
-        figures = measure(slot_policy(state, frozen), frozen.module, frozen.controller, batch.spec)
-        metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
-    return state, {name: float(value) for name, value in metrics.items()}
+@dataclass(frozen=True)
+class HighLevelLearner(Learner[TaskInference]):
+    """(global state, belief) -> subgoal of a frozen tracker."""
 
+    name = "high level"
+    config: HighLevelConfig
+    module: Inference
+    tracker: LoadedTracker
 
-def collect(
-    state: RunState,
-    batch: RobotBatch,
-    frozen: Frozen,
-    config: HighLevelConfig,
-    rng: np.random.Generator,
-    key: PRNGKeyArray,
-) -> tuple[Minds, Metrics]:
-    """Move every robot by `config.steps` decisions; write the replay in place.
+    @cached_property
+    def slots(self) -> Slots:
+        """One for each family that the module tells apart."""
+        return slots_within(self.module.contract.families, self.tracker.tracker.reach)
 
-    Returns the minds afterwards, and the mean reward that the task gave per decision, with the share that ended in a
-    fall.
-    """
-    spec, minds, module, rewards, falls = batch.spec, state.minds, frozen.module, [], []
-    encoder = module.parts.module.encoder
-    first = int(state.iteration) * config.steps
-    for step in range(first, first + config.steps):
-        task_key, action_key = jax.random.split(jax.random.fold_in(key, step - first))
-        if step % config.decisions == 0:
-            batch.reset(rng)
-            minds = new_minds(batch, module, task_key)
-        observation = observe(minds, module)
-        action, subgoal = _explore(state.sac.actor, observation, minds.state, frozen.slots, action_key)
-        before = batch.qpos.copy()
-        fell = hold(batch, frozen.controller, subgoal)
-        minds, earned = listen(encoder, minds, spec.observe(batch.qpos, before), module.contract.reward)
-        seen = SACBatch(
-            observation=np.asarray(observation),
-            action=np.asarray(action),
-            reward=shaped(np.asarray(earned) / encoder.reward_scale, fell, config),
-            next_observation=np.asarray(observe(minds, module)),
-            terminal=np.zeros(batch.size, np.float32),  # what has fallen goes on
-        )
-        write(state.replay, step * config.robots, seen)
-        put_on_feet(batch, rng)
-        rewards.append(earned)
-        falls.append(fell)
-    return minds, {"task_reward": float(np.mean(rewards)), "falls": float(np.mean(falls))}
+    @cached_property
+    def controller(self) -> TrackerController:
+        """What follows the subgoals."""
+        return TrackerController(self.tracker.tracker, self.spec.goal_ahead)
 
+    def sizes(self, batch: RobotBatch) -> tuple[int, int]:
+        """Those of the toy's policy, and a number for each slot."""
+        parts = self.module.parts
+        return parts.high_level.view.size(parts.module.encoder.latent), len(self.slots)
 
-def hold(batch: RobotBatch, controller: TrackerController, subgoal: Subgoal) -> Bool[np.ndarray, " robot"]:
-    """Follow a subgoal for a decision; which robots fell."""
-    fell = np.zeros(batch.size, bool)
-    for _ in range(batch.spec.steps_per_decision):
-        follow(controller, batch, subgoal)
-        fell |= batch.fallen
-    return fell
+    def begin(self, batch: RobotBatch, actor: Actor, key: PRNGKeyArray) -> TaskInference:
+        """Robots that know nothing."""
+        return begin_tasks(batch, self.module, key)
+
+    def collect(
+        self, state: OffPolicyState[TaskInference], batch: RobotBatch, rng: np.random.Generator, key: PRNGKeyArray
+    ) -> tuple[TaskInference, Metrics]:
+        """Decisions; the mean reward that the task gave, and the share that ended in a fall."""
+        module, known, rewards, falls = self.module, state.world, [], []
+        encoder = module.parts.module.encoder
+        first = int(state.iteration) * self.config.steps
+        for step in range(first, first + self.config.steps):
+            task_key, action_key = jax.random.split(jax.random.fold_in(key, step - first))
+            if step % self.config.decisions == 0:
+                batch.reset(rng)
+                known = begin_tasks(batch, module, task_key)
+            observation = self.observe(known)
+            action, subgoal = _explore(state.sac.actor, observation, known.state, self.slots, action_key)
+            now, fell = decision(batch, lambda _: follow(self.controller, batch, subgoal))  # noqa: B023 (used at once)
+            known, earned = infer(encoder, known, now, module.contract.reward)
+            seen = SACBatch(
+                observation=np.asarray(observation),
+                action=np.asarray(action),
+                reward=shaped(np.asarray(earned) / encoder.reward_scale, fell, self.config),
+                next_observation=np.asarray(self.observe(known)),
+                terminal=np.zeros(batch.size, np.float32),  # what has fallen goes on
+            )
+            state.replay.append(seen)
+            put_on_feet(batch, rng)
+            rewards.append(earned)
+            falls.append(fell)
+        return known, {"task_reward": float(np.mean(rewards)), "falls": float(np.mean(falls))}
+
+    def observe(self, known: TaskInference) -> Float[AnyArray, "robot feature"]:
+        """What the policy sees of each robot: what the toy's policy would see of a toy."""
+        parts = self.module.parts
+        return _view(parts.high_level.view, parts.module.decoder, known)
+
+    def update(self, policy: SACState, drawn: Any, key: PRNGKeyArray, iteration: int) -> tuple[SACState, dict]:
+        """Values are of the slot that is chosen in the end."""
+        return learn(policy, drawn, key, slot_sac(self.config.sac, len(self.slots)), judge=judge)
+
+    def measure(self, actor: Actor) -> dict[str, float]:
+        """Final errors, return, falls."""
+        return measure(self.policy(actor), self.module, self.controller, self.spec, self.config)
+
+    def save(self, actor: Actor, figures: dict[str, float], run: Run) -> Path:
+        """A high-level policy's artifact."""
+        return save_high_level(self.policy(actor), figures, self.module, self.tracker, self.spec, self.config, run)
+
+    def load_actor(self, artifact: str) -> Actor:
+        """That of a high-level policy."""
+        return load_high_level(artifact).policy.actor
+
+    def policy(self, actor: Actor) -> SlotPolicy:
+        """An actor, with what it sees and what its values ask for."""
+        return SlotPolicy(actor, self.module.parts.high_level.view, self.slots)
 
 
 def shaped(
@@ -169,43 +150,9 @@ def shaped(
     return np.asarray(earned + arrival - config.fall * fell, np.float32)
 
 
-def observe(minds: Minds, module: Inference) -> Float[AnyArray, "robot feature"]:
-    """What the policy sees of each robot: what the toy's policy would see of a toy."""
-    return _view(module.parts.high_level.view, module.parts.module.decoder, minds)
-
-
-def freeze(module: Inference, loaded: LoadedTracker, spec: RobotSpec) -> Frozen:
-    """What does not learn, with a slot for each family that the module tells apart."""
-    slots = slots_within(module.contract.families, loaded.tracker.reach)
-    return Frozen(module, TrackerController(loaded.tracker, spec.goal_ahead), slots)
-
-
-def initial_state(
-    config: HighLevelConfig, batch: RobotBatch, frozen: Frozen, key: PRNGKeyArray, init_from: str | None = None
-) -> RunState:
-    """Robots that know nothing, an empty replay, a fresh policy or that of an artifact."""
-    minds = new_minds(batch, frozen.module, key)
-    features, actions = observe(minds, frozen.module).shape[-1], len(frozen.slots)
-    policy = sac.initial_state(features, actions, config.sac, key)
-    if init_from is not None:
-        policy = sac.take_over(policy, load_high_level(init_from).policy.actor, init_from)
-    return RunState(
-        sac=policy,
-        replay=no_transitions(config.replay, features, actions),
-        minds=minds,
-        physics=batch.state,
-        iteration=np.zeros((), np.int64),
-    )
-
-
-def slot_policy(state: RunState, frozen: Frozen) -> SlotPolicy:
-    """The averaged actor, with what it sees and what its values ask for."""
-    return SlotPolicy(state.sac.averaged_actor, frozen.module.parts.high_level.view, frozen.slots)
-
-
 @eqx.filter_jit
-def _view(view, decoder, minds: Minds) -> Float[AnyArray, "robot feature"]:
-    return view(minds.state, decoder.interpret(minds.belief))
+def _view(view, decoder, known: TaskInference) -> Float[AnyArray, "robot feature"]:
+    return view(known.state, decoder.interpret(known.belief))
 
 
 @eqx.filter_jit

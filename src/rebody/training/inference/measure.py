@@ -16,9 +16,8 @@ from rebody.tasks import base_task, family_index
 from rebody.tasks.figures import final_error
 from rebody.training.inference.clusters import agreement, draw, new_mixture
 from rebody.training.inference.config import MetaConfig
-from rebody.types import Task
+from rebody.types import DECISION_DT, Task
 
-DECISIONS = 200
 BASE_TASK_AT = 10
 """Decisions after which the base task (family and sign) should be known."""
 PROBED_FROM = 20
@@ -42,16 +41,18 @@ class Outcome:
         return float(self.episodes.reward.sum(0).mean())
 
 
-def measure(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
+def measure(parts: InferenceParts, toy: Toy, config: MetaConfig) -> dict[str, float]:
     """Final errors [m, m/s, rad], return and the oracle's, and how sharply beliefs read out."""
+    held_out = config.held_out
     probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
     oracle = act("oracle", parts, toy, config, held_out)
     return _errors(outcome, config) | {"oracle return": oracle.total_return} | _readings(probe, outcome, config)
 
 
-def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
+def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig) -> dict[str, float]:
     """`measure`, and: the return with the exact posterior, sharpness on disturbed toys, changes of the task, and
     clusters where there is a mixture."""
+    held_out = config.held_out_at_end
     probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
     figures = _errors(outcome, config)
     for kind in ("bayes", "oracle"):
@@ -75,7 +76,7 @@ def act(
 ) -> Outcome:
     """An agent of a named kind on held-out tasks; the seeds are none that training uses."""
     task_key, disturbance_key = jax.random.split(jax.random.fold_in(jax.random.key(2**31 - 1), seed))
-    tasks = config.tasks.sample_episodes(task_key, held_out, DECISIONS, switch_share)
+    tasks = config.tasks.sample_episodes(task_key, held_out, round(config.held_out_s / DECISION_DT), switch_share)
     tasks = jax.tree.map(lambda leaf: leaf.T, tasks)
     rough = config.randomisation.sample(disturbance_key, (held_out,))
     inference = Inference("in training", contract_of(config), parts, toy)
@@ -97,9 +98,14 @@ def contract_of(config: MetaConfig) -> Contract:
 def fit(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int, *, disturbed: bool = False) -> Probe:
     """A probe of other episodes than those that figures are taken on."""
     outcome = act("reuse", parts, toy, config, held_out, seed=3 if disturbed else 1, disturbed=disturbed)
-    latent = np.asarray(outcome.episodes.belief.mean)[PROBED_FROM:]
-    tasks = jax.tree.map(lambda leaf: leaf[PROBED_FROM:].ravel(), outcome.tasks)
-    return fit_probe(latent.reshape(-1, latent.shape[-1]), tasks.family, tasks.target)
+    return probe_of(outcome.tasks, outcome.episodes)
+
+
+def probe_of(tasks: Task, episodes: Episodes) -> Probe:
+    """What can be read linearly from the beliefs of episodes."""
+    latent = np.asarray(episodes.belief.mean)[PROBED_FROM:]
+    active = jax.tree.map(lambda leaf: leaf[PROBED_FROM:].ravel(), tasks)
+    return fit_probe(latent.reshape(-1, latent.shape[-1]), active.family, active.target)
 
 
 def _errors(outcome: Outcome, config: MetaConfig) -> dict[str, float]:

@@ -16,31 +16,31 @@ import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from rebody.agents.parts import ScratchParts, load_scratch
-from rebody.bodies import RobotBatch, load_robot
-from rebody.bodies.check import require_ready
+from rebody.bodies import RobotBatch
 from rebody.control import sac
 from rebody.control.flat import FlatPolicy, FlatView
 from rebody.control.high_level import told_code
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.inference.module import InferenceModule
 from rebody.inference.prior import SplitPrior, unit_gaussian
-from rebody.inference.probe import Probe
 from rebody.jax_settings import own_jax_settings
-from rebody.ranges import check_ranges
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, refresh_beliefs
-from rebody.training.inference.train import optimiser_of, store, take_over, tell, update_inference
-from rebody.training.minds import Minds, listen, put_on_feet
-from rebody.training.motion import told_reward
-from rebody.training.run import Metrics, Run
+from rebody.training.inference.train import (
+    load_pretrained,
+    optimiser_of,
+    unfitted_probe,
+    update_inference,
+    with_tasks,
+)
+from rebody.training.motion import decision, privileged_reward, put_on_feet
+from rebody.training.off_policy import ready_robot
+from rebody.training.replay import store_group
+from rebody.training.run import Metrics, Run, measured
 from rebody.training.scratch.config import ScratchConfig
 from rebody.training.scratch.report import measure, save_scratch
-from rebody.types import AnyArray, Belief, Task, global_state
-
-REFRESH_EVERY = 8
-"""Iterations after which today's encoder goes along all stored episodes again."""
-DECIDES_EVERY = 4
-"""Of so many robots one takes the most likely action, as it will when it is used."""
+from rebody.training.task_inference import TaskInference, begin_inference, infer
+from rebody.types import AnyArray, Belief, GlobalState, Task, global_state
 
 
 class ControlSteps(eqx.Module):
@@ -87,16 +87,14 @@ def train_scratch(
     RebodyError if the robot is not ready, `out` holds another run, or `init_from` has other sizes; Interrupted on
     Ctrl-C.
     """
-    check_ranges(config)
-    spec = load_robot(robot)
-    require_ready(spec)
+    spec = ready_robot(robot, config)
     with Run(
         out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume, finish=finish
     ) as run:
         batch, meta = RobotBatch(spec, config.robots), config.meta(spec.reach)
         state = run.restore(initial_state(config, meta, batch, jax.random.key(seed), init_from))
         state = run.loop(state, lambda state: iterate(state, batch, config, meta, seed), config.iterations, "scratch")
-        return save_scratch(trained_parts(state, meta), spec, config, meta, run, seed)
+        return save_scratch(trained_parts(state, meta), spec, config, run)
 
 
 def iterate(
@@ -107,20 +105,19 @@ def iterate(
     rng = np.random.default_rng((seed, 2, iteration))
     keys = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration), 3)
     fresh = collect(state.module, state.sac.actor, batch, config, meta, rng, keys[0])
-    replay, stored = store(state.replay, fresh, state.iteration)
+    replay, stored = store_group(state.replay, fresh, state.iteration)
     prior = SplitPrior(unit_gaussian, config.inference.kinds, config.inference.kind_weight)
     module, optimiser, metrics = update_inference(
         state.module, state.optimiser, replay.episodes, stored, prior, meta, keys[1]
     )
-    if (iteration + 1) % REFRESH_EVERY == 0:
+    if (iteration + 1) % config.refresh_every == 0:
         replay = replace(replay, episodes=refresh_beliefs(module.encoder, replay.episodes, config.robots))
     policy, learned = update_policy(state.sac, module, replay, stored, config, keys[2])
     state = RunState(module, optimiser, policy, replay, state.iteration + 1)
     metrics |= learned | {"task_reward": fresh.episodes.reward.mean()}
-    if (iteration + 1) % config.evaluate_every == 0:
-        figures = measure(trained_parts(state, meta), meta, batch.spec)
-        metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
-    return state, {name: float(value) for name, value in metrics.items()}
+    return state, measured(
+        metrics, iteration, config.evaluate_every, lambda: measure(trained_parts(state, meta), config, batch.spec)
+    )
 
 
 def collect(
@@ -138,18 +135,16 @@ def collect(
     tasks = jax.tree.map(np.asarray, tasks)
     batch.reset(rng)
     batch.qpos[:, batch.spec.root_addresses[0]] = rng.uniform(-config.start, config.start, batch.size)
-    encoder, shape, here = module.encoder, (batch.size,), batch.spec.observe(batch.qpos, batch.qpos)
-    minds = Minds(encoder.initial(shape), encoder.prior(shape), here, jax.tree.map(lambda leaf: leaf[:, 0], tasks))
-    states, beliefs, actions, rewards, steps = [here], [minds.belief], [], [], []
-    for decision in range(config.decisions):
-        minds = replace(minds, task=jax.tree.map(lambda leaf: leaf[:, decision], tasks))  # noqa: B023 (used at once)
-        key = jax.random.fold_in(action_key, decision)
-        before = batch.qpos.copy()
-        held = hold(batch, minds, module, actor, config, rng, key)
-        minds, earned = listen(encoder, minds, batch.spec.observe(batch.qpos, before), meta.reward)
+    here, first = batch.spec.observe(batch.qpos, batch.qpos), jax.tree.map(lambda leaf: leaf[:, 0], tasks)
+    known = begin_inference(module.encoder, here, first)
+    states, beliefs, actions, rewards, steps = [here], [known.belief], [], [], []
+    for i in range(config.decisions):
+        known = replace(known, task=jax.tree.map(lambda leaf: leaf[:, i], tasks))  # noqa: B023 (used at once)
+        now, held = hold(batch, known, module, actor, config, rng, jax.random.fold_in(action_key, i))
+        known, earned = infer(module.encoder, known, now, meta.reward)
         steps += held
-        states.append(minds.state)
-        beliefs.append(minds.belief)
+        states.append(known.state)
+        beliefs.append(known.belief)
         actions.append(np.mean([step.action for step in held], axis=0))
         rewards.append(earned)
     along = [jax.tree.map(lambda *rows: np.stack(rows, axis=1), *rows) for rows in (states, beliefs, actions, rewards)]
@@ -158,30 +153,32 @@ def collect(
 
 def hold(
     batch: RobotBatch,
-    minds: Minds,
+    known: TaskInference,
     module: InferenceModule,
     actor: Actor,
     config: ScratchConfig,
     rng: np.random.Generator,
     key: PRNGKeyArray,
-) -> list[ControlSteps]:
-    """The control steps of a decision, all by the same belief."""
-    understood, steps = understand(module, minds, config), []
-    for step in range(batch.spec.steps_per_decision):
+) -> tuple[GlobalState, list[ControlSteps]]:
+    """Control steps by the same belief; the state after them, and the steps."""
+    interpreted, steps = interpret(module, known, config), []
+
+    def control_step(step: int) -> None:
         joints, x, before = batch.joint_state(), batch.x.astype(np.float32), batch.qpos.copy()
-        action = _explore(actor, config.view, joints, x, understood, jax.random.fold_in(key, step))
+        action = _explore(actor, config, joints, x, interpreted, jax.random.fold_in(key, step))
         batch.step(np.asarray(action))
         seen = ControlSteps(
             joints=joints,
             x=x,
             action=np.asarray(action),
-            reward=told_reward(batch, before, minds.task, np.asarray(action), config.reward),
+            reward=privileged_reward(batch, before, known.task, np.asarray(action), config.reward),
             next_joints=batch.joint_state(),
             next_x=batch.x.astype(np.float32),
         )
         steps.append(seen)
         put_on_feet(batch, rng)
-    return steps
+
+    return decision(batch, control_step)[0], steps
 
 
 @eqx.filter_jit
@@ -195,7 +192,7 @@ def update_policy(
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """Steps of soft actor-critic on stored control steps, with today's beliefs."""
     believed = module.decoder.interpret(replay.episodes.belief)
-    told = tell(replay.episodes, told_code(config.inference.places)).belief
+    told = with_tasks(replay.episodes, told_code(config.inference.places)).belief
 
     def batch_of(_: None, key: PRNGKeyArray) -> SACBatch:
         return sample_steps(replay, believed, told, stored, config, key)
@@ -242,7 +239,7 @@ def initial_state(
     policy = sac.initial_state(seen, actions, config.sac, sac_key)
     if init_from is not None:
         parts = load_scratch(init_from).parts
-        module = take_over(parts.module, module, init_from)
+        module = load_pretrained(parts.module, module, init_from)
         policy = sac.take_over(policy, parts.policy.actor, init_from)
     return RunState(
         module=module,
@@ -275,21 +272,20 @@ def _no_replay(config: ScratchConfig, batch: RobotBatch) -> Replay:
 
 def trained_parts(state: RunState, meta: MetaConfig) -> ScratchParts:
     """What is kept of a run, its probe not yet fitted."""
-    unfitted = jnp.zeros((meta.inference.latent + 1, len(meta.tasks.families)))
-    probe = Probe(jnp.asarray(meta.tasks.families), unfitted, unfitted)
-    return ScratchParts(state.module, FlatPolicy(state.sac.averaged_actor, FlatView(meta.inference.places)), probe)
+    policy = FlatPolicy(state.sac.averaged_actor, FlatView(meta.inference.places))
+    return ScratchParts(state.module, policy, unfitted_probe(meta))
 
 
 @eqx.filter_jit
-def understand(module: InferenceModule, minds: Minds, config: ScratchConfig) -> Belief:
+def interpret(module: InferenceModule, known: TaskInference, config: ScratchConfig) -> Belief:
     """What each robot goes by: the first ones are told."""
     robots = jnp.arange(config.robots)[:, None]
-    told, believed = told_code(config.inference.places)(minds.task), module.decoder.interpret(minds.belief)
+    told, believed = told_code(config.inference.places)(known.task), module.decoder.interpret(known.belief)
     return jax.tree.map(lambda yes, no: jnp.where(robots < config.told_share * config.robots, yes, no), told, believed)
 
 
 @eqx.filter_jit
-def _explore(actor: Actor, view: FlatView, joints, x, understood: Belief, key: PRNGKeyArray):
-    observation = view(joints, x, understood)
-    decides = jnp.arange(len(x))[:, None] % DECIDES_EVERY == 0
+def _explore(actor: Actor, config: ScratchConfig, joints, x, interpreted: Belief, key: PRNGKeyArray):
+    observation = config.view(joints, x, interpreted)
+    decides = jnp.arange(len(x))[:, None] % config.decides_every == 0
     return jnp.where(decides, actor(observation), actor.sample(observation, key)[0])

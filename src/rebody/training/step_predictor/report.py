@@ -1,6 +1,5 @@
 """What a step predictor earns beside fixed strides, and the artifact that it leaves behind."""
 
-from dataclasses import asdict
 from pathlib import Path
 
 import jax
@@ -13,30 +12,28 @@ from rebody.bodies import RobotBatch, RobotSpec
 from rebody.control.sac import SACBatch
 from rebody.control.step_predictor import MOST_STEPS, SLOTS, STEP_COST, StepPredictor, steps_of
 from rebody.control.tracker import Tracker
-from rebody.store import save_artifact, tree_hash
+from rebody.store import tree_hash
 from rebody.tasks import FAMILIES
-from rebody.training.card import card
+from rebody.training.card import save
 from rebody.training.run import Run
 from rebody.training.step_predictor.chase import advance, begin
-from rebody.training.step_predictor.choosers import Chooser, Deciding, Fixed
+from rebody.training.step_predictor.choosers import Chooser, Fixed
 from rebody.training.step_predictor.config import StepPredictorConfig
 
-ROBOTS = 100
-SECONDS = 20.0
 STRIDES = (1, 2, 5, 10)
 """Fixed numbers of control steps that it is compared with."""
 
 
 def measure(chooser: Chooser, tracker: Tracker, spec: RobotSpec, config: StepPredictorConfig) -> dict[str, float]:
     """Means over the subgoals of held-out chases, the error relative to the subgoal; falls per minute of a robot."""
-    batch = RobotBatch(spec, ROBOTS)
+    batch = RobotBatch(spec, config.held_out)
     seen = chase(chooser, batch, tracker, config)
     steps = np.asarray(steps_of(seen.action))
     stood = seen.terminal == 0
     figures = {
         "reward": np.mean(seen.reward),
         "relative error": np.mean((-seen.reward - STEP_COST * steps)[stood]),
-        "falls per minute": 60 * np.sum(seen.terminal) / (ROBOTS * SECONDS),
+        "falls per minute": 60 * np.sum(seen.terminal) / (config.held_out * config.held_out_s),
     }
     slots = seen.observation[:, batch.tracker_state().shape[-1] :]  # one-hot, then the values
     for slot in SLOTS:
@@ -51,17 +48,22 @@ def chase(chooser: Chooser, batch: RobotBatch, tracker: Tracker, config: StepPre
     world = begin(batch, tracker.reach, chooser, config, key)
     ended = [
         advance(world, batch, tracker, chooser, config, rng, jax.random.fold_in(key, step))
-        for step in range(round(SECONDS / batch.spec.control_dt))
+        for step in range(round(config.held_out_s / batch.spec.control_dt))
     ]
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *ended)
 
 
 def save_step_predictor(
-    predictor: StepPredictor, loaded: LoadedTracker, spec: RobotSpec, config: StepPredictorConfig, run: Run, seed: int
+    predictor: StepPredictor,
+    figures: dict[str, float],
+    loaded: LoadedTracker,
+    spec: RobotSpec,
+    config: StepPredictorConfig,
+    run: Run,
 ) -> Path:
-    """Measure it beside fixed strides, write artifact and card."""
+    """Measure fixed strides beside it, write artifact and card."""
     actor = predictor.actor
-    stored = StepPredictorSettings(
+    settings = StepPredictorSettings(
         robot=spec.name,
         tracker=loaded.name,
         tracker_hash=tree_hash(loaded.tracker),
@@ -69,9 +71,8 @@ def save_step_predictor(
         observations=actor.observations,
         hidden=config.sac.hidden,
         projections=config.sac.projections,
-        training=asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
+        training=run.training(config),
     )
-    figures = measure(Deciding(actor), loaded.tracker, spec, config)
     rows = {f"{name}, predicted": f"{value:.3f}" for name, value in figures.items()}
     for stride in STRIDES:
         fixed = measure(Fixed(jnp.asarray(stride)), loaded.tracker, spec, config)
@@ -80,9 +81,7 @@ def save_step_predictor(
     what = (
         f"How many control steps a subgoal will take '{spec.name}' and '{loaded.name}': (joint state, subgoal) -> 1 to "
         f"{MOST_STEPS}. Trained on {steps:,} control steps with {run.iterations * config.updates:,} updates. The "
-        f"figures are means over the subgoals of {ROBOTS} robots that chase toys one decision ahead for {SECONDS:g} s."
+        f"figures are means over the subgoals of {config.held_out} robots that chase toys one decision ahead for "
+        f"{config.held_out_s:g} s."
     )
-    text = card(f"Step predictor: {spec.name}", what, run, seed, rows)
-    return save_artifact(
-        run.out, kind="step-predictor", config=asdict(stored), weights=predictor, card=text, log=run.log
-    )
+    return save("step-predictor", settings, predictor, run, f"Step predictor: {spec.name}", what, rows)
