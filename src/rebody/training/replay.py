@@ -1,6 +1,6 @@
 """Replay buffers: rows in host memory, or groups of episodes on the device."""
 
-from typing import Generic, Self
+from typing import Generic
 
 import equinox as eqx
 import jax
@@ -18,7 +18,7 @@ class Replay(eqx.Module, Generic[Tree]):
     written: Int[np.ndarray, ""]  # rows ever
 
     @classmethod
-    def empty(cls, size: int, like: Tree) -> Self:
+    def empty(cls, size: int, like: Tree) -> "Replay[Tree]":
         """Room for so many rows such as those of `like`."""
         rows = jax.tree.map(lambda leaf: np.zeros((size, *leaf.shape[1:]), leaf.dtype), like)
         return cls(rows, np.zeros((), np.int64))

@@ -12,6 +12,9 @@ import jax
 import numpy as np
 from jaxtyping import Float, PRNGKeyArray
 
+from rebody.agents.build import build_agent
+from rebody.agents.configs import FlatSettings
+from rebody.agents.controller import FlatController
 from rebody.agents.parts import Inference, load_flat, load_inference
 from rebody.bodies import RobotBatch
 from rebody.control.flat import FlatPolicy, FlatView
@@ -19,12 +22,14 @@ from rebody.control.sac import Actor, SACBatch
 from rebody.control.tracker import slots_of
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
+from rebody.store import tree_hash
+from rebody.training.card import save
 from rebody.training.flat.config import FlatConfig
-from rebody.training.flat.report import measure, save_flat
+from rebody.training.held_out import act, figures_of, rows_of
 from rebody.training.motion import LastDecision, privileged_reward, put_on_feet
 from rebody.training.off_policy import Learner, OffPolicyState, explore, ready_robot, train
 from rebody.training.run import Metrics, Run
-from rebody.training.task_inference import TaskInference, begin_tasks, infer
+from rebody.training.task_inference import TaskInference, begin_tasks, infer, tasks_within
 from rebody.types import Belief
 
 
@@ -120,12 +125,35 @@ class FlatLearner(Learner[World]):
         return FlatView(self.module.parts.high_level.view.places, farthest)
 
     def measure(self, actor: Actor) -> dict[str, float]:
-        """Final errors, return, falls."""
-        return measure(FlatPolicy(actor, self.view), self.module, self.spec, self.config)
+        """Final error of each family, return, share that fell."""
+        module, config = self.module, self.config
+        controller = FlatController(FlatPolicy(actor, self.view), module.parts.module.decoder)
+        agent, tasks = build_agent("flat", module), tasks_within(module, self.spec.reach)
+        form, size, seconds = module.contract.reward, config.held_out, config.held_out_s
+        return figures_of(*act(agent, controller, self.spec, tasks, form, size, seconds))
 
     def save(self, actor: Actor, figures: dict[str, float], run: Run) -> Path:
         """A flat policy's artifact."""
-        return save_flat(FlatPolicy(actor, self.view), figures, self.module, self.spec, self.config, run)
+        robot, module, config = self.spec.name, self.module, self.config
+        settings = FlatSettings(
+            robot=robot,
+            inference=module.name,
+            inference_hash=tree_hash(module.parts.module),
+            reach=self.view.reach,
+            places=self.view.places,
+            observations=actor.observations,
+            actions=actor.actions,
+            hidden=config.sac.hidden,
+            projections=config.sac.projections,
+            training=run.training(config),
+        )
+        steps = run.iterations * config.steps * config.robots
+        what = (
+            f"Flat policy of '{robot}': (joint state, x, belief of '{module.name}') -> joint action, without "
+            f"subgoals. Trained on {steps:,} control steps with {run.iterations * config.updates:,} updates."
+        )
+        rows = rows_of(figures, config.held_out, config.held_out_s)
+        return save("flat", settings, FlatPolicy(actor, self.view), run, f"Flat policy: {robot}", what, rows)
 
     def load_actor(self, artifact: str) -> Actor:
         """That of a flat policy."""

@@ -14,7 +14,8 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, PRNGKeyArray
 
-from rebody.agents.build import check_robot_of
+from rebody.agents.build import build_agent, check_robot_of
+from rebody.agents.configs import HighLevelSettings
 from rebody.agents.controller import TrackerController
 from rebody.agents.parts import Inference, LoadedTracker, load_high_level, load_inference, load_tracker
 from rebody.agents.rollout import follow
@@ -22,13 +23,16 @@ from rebody.bodies import RobotBatch
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.slot_policy import SlotPolicy, Slots, draw, judge, slot_sac, slots_within, subgoal_of
 from rebody.jax_settings import own_jax_settings
+from rebody.store import tree_hash
+from rebody.tasks import FAMILIES
 from rebody.training.arrival import arrival_bonus
+from rebody.training.card import save
+from rebody.training.held_out import act, figures_of, rows_of
 from rebody.training.high_level.config import HighLevelConfig
-from rebody.training.high_level.report import measure, save_high_level
 from rebody.training.motion import decision, put_on_feet
 from rebody.training.off_policy import Learner, OffPolicyState, learn, ready_robot, train
 from rebody.training.run import Metrics, Run
-from rebody.training.task_inference import TaskInference, begin_tasks, infer
+from rebody.training.task_inference import TaskInference, begin_tasks, infer, tasks_within
 from rebody.types import AnyArray, GlobalState
 
 
@@ -126,12 +130,38 @@ class HighLevelLearner(Learner[TaskInference]):
         return learn(policy, drawn, key, slot_sac(self.config.sac, len(self.slots)), judge=judge)
 
     def measure(self, actor: Actor) -> dict[str, float]:
-        """Final errors, return, falls."""
-        return measure(self.policy(actor), self.module, self.controller, self.spec, self.config)
+        """Final error of each family, return, share that fell."""
+        module, config = self.module, self.config
+        agent = build_agent("retrain", module, high_level=self.policy(actor))
+        tasks, form = tasks_within(module, self.spec.reach), module.contract.reward
+        size, seconds = config.held_out, config.held_out_s
+        return figures_of(*act(agent, self.controller, self.spec, tasks, form, size, seconds))
 
     def save(self, actor: Actor, figures: dict[str, float], run: Run) -> Path:
         """A high-level policy's artifact."""
-        return save_high_level(self.policy(actor), figures, self.module, self.tracker, self.spec, self.config, run)
+        robot, module, tracker, config = self.spec.name, self.module, self.tracker, self.config
+        settings = HighLevelSettings(
+            robot=robot,
+            inference=module.name,
+            inference_hash=tree_hash(module.parts.module),
+            tracker=tracker.name,
+            tracker_hash=tree_hash(tracker.tracker),
+            view=module.parts.high_level.view,
+            slots={FAMILIES[family].name: scale for family, scale in self.slots},
+            observations=actor.observations,
+            hidden=config.sac.hidden,
+            projections=config.sac.projections,
+            training=run.training(config),
+        )
+        decisions = run.iterations * config.steps * config.robots
+        what = (
+            f"High-level policy of '{robot}': (global state, belief of '{module.name}') -> subgoal of "
+            f"'{tracker.name}'. Trained on {decisions:,} decisions, which are "
+            f"{decisions * self.spec.steps_per_decision:,} control steps, with "
+            f"{run.iterations * config.updates:,} updates; module and tracker are frozen."
+        )
+        rows = rows_of(figures, config.held_out, config.held_out_s)
+        return save("high-level", settings, self.policy(actor), run, f"High-level policy: {robot}", what, rows)
 
     def load_actor(self, artifact: str) -> Actor:
         """That of a high-level policy."""

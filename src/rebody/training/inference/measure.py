@@ -41,18 +41,16 @@ class Outcome:
         return float(self.episodes.reward.sum(0).mean())
 
 
-def measure(parts: InferenceParts, toy: Toy, config: MetaConfig) -> dict[str, float]:
+def measure(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
     """Final errors [m, m/s, rad], return and the oracle's, and how sharply beliefs read out."""
-    held_out = config.held_out
     probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
     oracle = act("oracle", parts, toy, config, held_out)
     return _errors(outcome, config) | {"oracle return": oracle.total_return} | _readings(probe, outcome, config)
 
 
-def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig) -> dict[str, float]:
+def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
     """`measure`, and: the return with the exact posterior, sharpness on disturbed toys, changes of the task, and
     clusters where there is a mixture."""
-    held_out = config.held_out_at_end
     probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
     figures = _errors(outcome, config)
     for kind in ("bayes", "oracle"):

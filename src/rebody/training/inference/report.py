@@ -17,7 +17,7 @@ from rebody.training.run import Run
 def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run, title: str) -> Path:
     """Fit the probe, measure, write artifact and card."""
     held_out = config.held_out_at_end
-    figures = measure_in_depth(parts, toy, config)
+    figures = measure_in_depth(parts, toy, config, held_out)
     parts = eqx.tree_at(lambda p: p.probe, parts, fit(parts, toy, config, held_out, disturbed=True))
     contract, view = contract_of(config), config.policy_view
     settings = InferenceSettings(

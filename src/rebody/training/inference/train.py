@@ -110,7 +110,10 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
         metrics |= learned
     state = RunState(module, optimiser, policy, privileged, clusters, replay, state.iteration + 1)
     return state, measured(
-        metrics, iteration, config.evaluate_every, lambda: measure(trained_parts(state, config), toy, config)
+        metrics,
+        iteration,
+        config.evaluate_every,
+        lambda: measure(trained_parts(state, config), toy, config, config.held_out),
     )
 
 
