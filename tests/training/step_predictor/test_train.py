@@ -17,8 +17,7 @@ from rebody.tasks import GOAL, VELOCITY
 from rebody.training.off_policy import initial_state, learn
 from rebody.training.replay import Replay
 from rebody.training.step_predictor import StepPredictorConfig
-from rebody.training.step_predictor.chase import advance, begin
-from rebody.training.step_predictor.choosers import Chooser, Fixed
+from rebody.training.step_predictor.chase import Fixed, advance, begin
 from rebody.training.step_predictor.train import StepPredictorLearner
 
 ROBOTS, JOINTS = 5, 17
@@ -26,7 +25,7 @@ STEPS = (1, 2, 3, 7, 20)
 """How long each robot holds its subgoals."""
 
 
-class Own(Chooser):
+class Own(eqx.Module):
     """Each robot has its own number."""
 
     def __call__(self, observation, key):

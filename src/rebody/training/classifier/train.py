@@ -10,16 +10,18 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
-from rebody.agents.parts import Inference, load_inference
-from rebody.agents.slots import SlotClassifier
+from rebody.agents.configs import ClassifierSettings
+from rebody.agents.parts import Inference, SlotParts, load_inference
+from rebody.agents.slots import SlotChooser, SlotClassifier, SlotOfCluster
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
 from rebody.nn import MLP
 from rebody.ranges import check_ranges
-from rebody.store import load_artifact
+from rebody.store import load_artifact, tree_hash
+from rebody.tasks import family_names
+from rebody.training.card import save
 from rebody.training.classifier.config import ClassifierConfig
-from rebody.training.classifier.data import ToyWorld, act
-from rebody.training.classifier.report import save_slots
+from rebody.training.classifier.data import KNOWN_FROM, ToyWorld, act, slots_of_clusters
 from rebody.training.run import Metrics, Run
 from rebody.types import AnyArray, Belief
 
@@ -113,6 +115,54 @@ def cross_entropy(classifier: SlotClassifier, seen: Beliefs) -> Float[Array, ""]
     """Binary, per slot."""
     wanted = seen.family[:, None] == np.asarray(classifier.families)
     return optax.sigmoid_binary_cross_entropy(classifier.logits(seen.belief), wanted.astype(jnp.float32)).mean()
+
+
+def save_slots(
+    classifier: SlotClassifier, module: Inference, world: ToyWorld, config: ClassifierConfig, run: Run
+) -> Path:
+    """Find the slots of clusters, measure both, write artifact and card."""
+    slots = np.zeros(0, np.int32)
+    choosers: dict[str, SlotChooser] = {"classifier": classifier}
+    if module.parts.mixture is not None:
+        key = jax.random.fold_in(jax.random.key(run.settings["seed"]), 1)
+        tasks, disturbance = world.draw(key, config.held_out, config.decisions, 0.0, disturbed=False)
+        slots = slots_of_clusters(module, tasks, disturbance)
+        choosers["clusters"] = SlotOfCluster(module.parts.mixture, slots)
+    settings = ClassifierSettings(
+        inference=module.name,
+        inference_hash=tree_hash(module.parts.module),
+        latent=module.parts.module.encoder.latent,
+        families=classifier.families,
+        hidden=config.hidden,
+        components=len(slots),
+        training=run.training(config),
+    )
+    rows = {}
+    for name, chooser in choosers.items():
+        for disturbed in (False, True):
+            where = "disturbed" if disturbed else "nominal"
+            wrong = wrong_slots(chooser, module, world, config, disturbed=disturbed)
+            rows[f"wrong slots by {name}, {where} toys, from {KNOWN_FROM} decisions on"] = f"{100 * wrong:.3f} %"
+    if module.parts.mixture is not None:
+        active = np.flatnonzero(np.asarray(module.parts.mixture.active))
+        rows["slots of clusters"] = ", ".join(f"{k}: {family_names()[slots[k]]}" for k in active)
+    what = (
+        f"Chooses a tracker's slot from a belief of '{module.name}': a classifier trained with labels on the toy, and "
+        f"a slot for each of the mixture's components, found without labels as the one that earns most on the toy."
+    )
+    return save("classifier", settings, SlotParts(classifier, slots), run, f"Slots: {module.name}", what, rows)
+
+
+def wrong_slots(
+    chooser: SlotChooser, module: Inference, world: ToyWorld, config: ClassifierConfig, *, disturbed: bool
+) -> float:
+    """Share of decisions with another slot than the task's, once something can be known, on held-out tasks."""
+    tasks, disturbance = world.draw(
+        jax.random.key(2**31 - 1), config.held_out, config.decisions, 0.0, disturbed=disturbed
+    )
+    belief = act(module, tasks, disturbance).belief
+    chosen = np.asarray(eqx.filter_jit(chooser)(belief))
+    return float(np.mean(chosen[KNOWN_FROM:] != np.asarray(tasks.family)[KNOWN_FROM:]))
 
 
 def _optimiser(config: ClassifierConfig) -> optax.GradientTransformation:

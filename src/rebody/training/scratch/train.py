@@ -15,8 +15,12 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
+from rebody.agents.agent import FlatAgent
+from rebody.agents.configs import ScratchSettings
+from rebody.agents.controller import FlatController
 from rebody.agents.parts import ScratchParts, load_scratch
-from rebody.bodies import RobotBatch
+from rebody.agents.rollout import Episodes as Rollouts
+from rebody.bodies import RobotBatch, RobotSpec
 from rebody.control import sac
 from rebody.control.flat import FlatPolicy, FlatView
 from rebody.control.high_level import told_code
@@ -24,8 +28,11 @@ from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.inference.module import InferenceModule
 from rebody.inference.prior import SplitPrior, unit_gaussian
 from rebody.jax_settings import own_jax_settings
+from rebody.training.card import save
+from rebody.training.held_out import act, figures_of, rows_of
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, refresh_beliefs
+from rebody.training.inference.measure import contract_of, probe_of
 from rebody.training.inference.train import (
     load_pretrained,
     optimiser_of,
@@ -38,7 +45,6 @@ from rebody.training.off_policy import ready_robot
 from rebody.training.replay import store_group
 from rebody.training.run import Metrics, Run, measured
 from rebody.training.scratch.config import ScratchConfig
-from rebody.training.scratch.report import measure, save_scratch
 from rebody.training.task_inference import TaskInference, begin_inference, infer
 from rebody.types import AnyArray, Belief, GlobalState, Task, global_state
 
@@ -289,3 +295,41 @@ def _explore(actor: Actor, config: ScratchConfig, joints, x, interpreted: Belief
     observation = config.view(joints, x, interpreted)
     decides = jnp.arange(len(x))[:, None] % config.decides_every == 0
     return jnp.where(decides, actor(observation), actor.sample(observation, key)[0])
+
+
+def measure(parts: ScratchParts, config: ScratchConfig, spec: RobotSpec) -> dict[str, float]:
+    """Final error on held-out tasks of each family, return, share that fell."""
+    return figures_of(*act_on(parts, config, spec, seed=0))
+
+
+def act_on(parts: ScratchParts, config: ScratchConfig, spec: RobotSpec, *, seed: int) -> tuple[Task, Rollouts]:
+    """Robots on held-out tasks."""
+    agent = FlatAgent(inferrer=parts.module.encoder, reader=parts.probe, stride=1)
+    controller, meta = FlatController(parts.policy, parts.module.decoder), config.meta(spec.reach)
+    return act(agent, controller, spec, meta.tasks, meta.reward, config.held_out, config.held_out_s, seed)
+
+
+def save_scratch(parts: ScratchParts, spec: RobotSpec, config: ScratchConfig, run: Run) -> Path:
+    """Measure, fit the probe on other tasks, write artifact and card."""
+    figures = measure(parts, config, spec)
+    parts = eqx.tree_at(lambda p: p.probe, parts, probe_of(*act_on(parts, config, spec, seed=1)))
+    actor = parts.policy.actor
+    settings = ScratchSettings(
+        robot=spec.name,
+        contract=contract_of(config.meta(spec.reach)),
+        inference=config.inference,
+        observations=actor.observations,
+        actions=actor.actions,
+        hidden=config.sac.hidden,
+        projections=config.sac.projections,
+        training=run.training(config),
+    )
+    rows = rows_of(figures, config.held_out, config.held_out_s)
+    decisions = run.iterations * config.robots * config.decisions
+    what = (
+        f"Inference module and joint policy of '{spec.name}', learned together on the robot: nothing is reused. "
+        f"Trained on {decisions * spec.steps_per_decision:,} control steps with "
+        f"{run.iterations * config.policy_updates:,} updates of the policy and "
+        f"{run.iterations * config.inference_updates:,} of the module."
+    )
+    return save("scratch", settings, parts, run, f"From scratch: {spec.name}", what, rows)

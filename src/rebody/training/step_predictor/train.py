@@ -8,23 +8,30 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PRNGKeyArray
 
 from rebody.agents.build import check_robot_of
+from rebody.agents.configs import StepPredictorSettings
 from rebody.agents.parts import LoadedTracker, load_step_predictor, load_tracker
-from rebody.bodies import RobotBatch
+from rebody.bodies import RobotBatch, RobotSpec
 from rebody.control.sac import Actor, SACBatch
-from rebody.control.step_predictor import MOST_STEPS, StepPredictor, steps_of
+from rebody.control.step_predictor import MOST_STEPS, SLOTS, STEP_COST, StepPredictor, steps_of
+from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
+from rebody.store import tree_hash
+from rebody.tasks import FAMILIES
+from rebody.training.card import save
 from rebody.training.motion import tracker_features
 from rebody.training.off_policy import Learner, OffPolicyState, ready_robot, train
 from rebody.training.run import Metrics, Run
-from rebody.training.step_predictor.chase import World, advance, begin
-from rebody.training.step_predictor.choosers import Deciding, Exploring
+from rebody.training.step_predictor.chase import Chooser, Deciding, Exploring, Fixed, World, advance, begin
 from rebody.training.step_predictor.config import StepPredictorConfig
-from rebody.training.step_predictor.report import measure, save_step_predictor
+
+STRIDES = (1, 2, 5, 10)
+"""Fixed numbers of control steps that it is compared with."""
 
 
 @own_jax_settings()
@@ -91,10 +98,61 @@ class StepPredictorLearner(Learner[World]):
         return measure(Deciding(actor), self.tracker.tracker, self.spec, self.config)
 
     def save(self, actor: Actor, figures: dict[str, float], run: Run) -> Path:
-        """A step predictor's artifact."""
-        predictor = StepPredictor(actor, self.tracker.tracker.reach)
-        return save_step_predictor(predictor, figures, self.tracker, self.spec, self.config, run)
+        """A step predictor's artifact; fixed strides are measured beside it."""
+        robot, tracker, config = self.spec.name, self.tracker, self.config
+        predictor = StepPredictor(actor, tracker.tracker.reach)
+        settings = StepPredictorSettings(
+            robot=robot,
+            tracker=tracker.name,
+            tracker_hash=tree_hash(tracker.tracker),
+            reach=predictor.reach,
+            observations=actor.observations,
+            hidden=config.sac.hidden,
+            projections=config.sac.projections,
+            training=run.training(config),
+        )
+        rows = {f"{name}, predicted": f"{value:.3f}" for name, value in figures.items()}
+        for stride in STRIDES:
+            fixed = measure(Fixed(jnp.asarray(stride)), tracker.tracker, self.spec, config)
+            rows |= {f"{name}, always {stride}": f"{fixed[name]:.3f}" for name in ("reward", "relative error")}
+        steps = run.iterations * config.steps * config.robots
+        what = (
+            f"How many control steps a subgoal will take '{robot}' and '{tracker.name}': (joint state, subgoal) -> 1 "
+            f"to {MOST_STEPS}. Trained on {steps:,} control steps with {run.iterations * config.updates:,} updates. "
+            f"The figures are means over the subgoals of {config.held_out} robots that chase toys one decision ahead "
+            f"for {config.held_out_s:g} s."
+        )
+        return save("step-predictor", settings, predictor, run, f"Step predictor: {robot}", what, rows)
 
     def load_actor(self, artifact: str) -> Actor:
         """That of a step predictor."""
         return load_step_predictor(artifact).predictor.actor
+
+
+def measure(chooser: Chooser, tracker: Tracker, spec: RobotSpec, config: StepPredictorConfig) -> dict[str, float]:
+    """Means over the subgoals of held-out chases, the error relative to the subgoal; falls per minute of a robot."""
+    batch = RobotBatch(spec, config.held_out)
+    seen = chase(chooser, batch, tracker, config)
+    steps = np.asarray(steps_of(seen.action))
+    stood = seen.terminal == 0
+    figures = {
+        "reward": np.mean(seen.reward),
+        "relative error": np.mean((-seen.reward - STEP_COST * steps)[stood]),
+        "falls per minute": 60 * np.sum(seen.terminal) / (config.held_out * config.held_out_s),
+    }
+    slots = seen.observation[:, batch.tracker_state().shape[-1] :]  # one-hot, then the values
+    for slot in SLOTS:
+        figures[f"control steps, {FAMILIES[slot].name}"] = np.mean(steps[slots[:, slot] == 1])
+    return {name: float(value) for name, value in figures.items()}
+
+
+def chase(chooser: Chooser, batch: RobotBatch, tracker: Tracker, config: StepPredictorConfig) -> SACBatch:
+    """Every subgoal that ended while robots chased toys, from their rest pose on."""
+    rng, key = np.random.default_rng(2**31 - 1), jax.random.key(2**31 - 1)
+    batch.reset(rng)
+    world = begin(batch, tracker.reach, chooser, config, key)
+    ended = [
+        advance(world, batch, tracker, chooser, config, rng, jax.random.fold_in(key, step))
+        for step in range(round(config.held_out_s / batch.spec.control_dt))
+    ]
+    return jax.tree.map(lambda *leaves: np.concatenate(leaves), *ended)

@@ -4,7 +4,7 @@ It is paid as a tracker would be that was told the hidden task; all it hears of 
 the module makes of the rewards (thesis 6.3.2).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import equinox as eqx
@@ -18,19 +18,31 @@ from rebody.agents.controller import FlatController
 from rebody.agents.parts import Inference, load_flat, load_inference
 from rebody.bodies import RobotBatch
 from rebody.control.flat import FlatPolicy, FlatView
-from rebody.control.sac import Actor, SACBatch
-from rebody.control.tracker import slots_of
+from rebody.control.sac import Actor, SACBatch, SACConfig
+from rebody.control.tracker import TrackerReward, slots_of
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
+from rebody.ranges import Decisions
 from rebody.store import tree_hash
 from rebody.training.card import save
-from rebody.training.flat.config import FlatConfig
 from rebody.training.held_out import act, figures_of, rows_of
 from rebody.training.motion import LastDecision, privileged_reward, put_on_feet
-from rebody.training.off_policy import Learner, OffPolicyState, explore, ready_robot, train
+from rebody.training.off_policy import Learner, OffPolicyConfig, OffPolicyState, explore, ready_robot, train
 from rebody.training.run import Metrics, Run
 from rebody.training.task_inference import TaskInference, begin_tasks, infer, tasks_within
 from rebody.types import Belief
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlatConfig(OffPolicyConfig):
+    """One training run of a flat policy; robots, steps and updates are a tracker's."""
+
+    decisions: Decisions = 200
+    """Length of an episode: 20 s, as long as it will be used."""
+    reward: TrackerReward = field(default_factory=TrackerReward)
+    """What the policy is paid: as a tracker that is told the hidden task."""
+    sac: SACConfig = field(default_factory=lambda: SACConfig(projections=8, decay_updates=180_000))
+    """Hyperparameters of soft actor-critic."""
 
 
 @own_jax_settings()

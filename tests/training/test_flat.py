@@ -9,8 +9,7 @@ import pytest
 from rebody.bodies import RobotBatch
 from rebody.control.sac import SACConfig
 from rebody.store import tree_hash
-from rebody.training.flat import FlatConfig
-from rebody.training.flat.train import FlatLearner
+from rebody.training.flat import FlatConfig, FlatLearner
 from rebody.training.motion import put_on_feet
 from rebody.training.off_policy import initial_state
 from rebody.types import Transition, global_state

@@ -4,7 +4,7 @@ The module that believes and the tracker that moves the joints are frozen; what 
 asks for. A step of its decision process is a decision of 0.1 s, its reward the task's own: nobody tells it the task.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -20,20 +20,50 @@ from rebody.agents.controller import TrackerController
 from rebody.agents.parts import Inference, LoadedTracker, load_high_level, load_inference, load_tracker
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch
-from rebody.control.sac import Actor, SACBatch, SACState
+from rebody.control.high_level import high_level_sac
+from rebody.control.sac import Actor, SACBatch, SACConfig, SACState
 from rebody.control.slot_policy import SlotPolicy, Slots, draw, judge, slot_sac, slots_within, subgoal_of
 from rebody.jax_settings import own_jax_settings
+from rebody.ranges import Copies, Count, Decisions, NotNegative, Number, Positive, Rows
 from rebody.store import tree_hash
 from rebody.tasks import FAMILIES
 from rebody.training.arrival import arrival_bonus
 from rebody.training.card import save
 from rebody.training.held_out import act, figures_of, rows_of
-from rebody.training.high_level.config import HighLevelConfig
 from rebody.training.motion import decision, put_on_feet
-from rebody.training.off_policy import Learner, OffPolicyState, learn, ready_robot, train
+from rebody.training.off_policy import Learner, OffPolicyConfig, OffPolicyState, learn, ready_robot, train
 from rebody.training.run import Metrics, Run
 from rebody.training.task_inference import TaskInference, begin_tasks, infer, tasks_within
 from rebody.types import AnyArray, GlobalState
+
+
+@dataclass(frozen=True, kw_only=True)
+class HighLevelConfig(OffPolicyConfig):
+    """One training run of a high-level policy."""
+
+    steps: Copies = 25
+    """Decisions of each robot in an iteration."""
+    updates: Count = 512
+    """Updates in an iteration."""
+    iterations: Number = 320
+    """Length of the run."""
+    evaluate_every: Count = 20
+    """Iterations from one measurement on held-out tasks to the next."""
+    replay: Rows = 512_000
+    """Decisions kept: all of the run. Without its first ones, which tried everything, it gets worse again."""
+    decisions: Decisions = 100
+    """Length of an episode: 10 s."""
+    arrival: NotNegative = 0.3
+    """Added to the scaled reward r of a decision when r = 0: it pulls the last centimetres, and pays for a jump."""
+    arrival_width: Positive = 0.1
+    """Half of it is added at r = -arrival_width."""
+    fall: NotNegative = 5.0
+    """Taken from the reward of a decision in which the robot fell."""
+    # with -1 in place of -2 nats values stay so uncertain that speeds are missed by three times as much
+    sac: SACConfig = field(
+        default_factory=lambda: replace(high_level_sac(projections=16, decay_updates=160_000), target_entropy=-2.0)
+    )
+    """Hyperparameters of soft actor-critic."""
 
 
 @own_jax_settings()

@@ -13,8 +13,7 @@ from rebody.control.sac import SACConfig
 from rebody.control.slot_policy import subgoal_of
 from rebody.store import tree_hash
 from rebody.tasks import GOAL
-from rebody.training.high_level import HighLevelConfig
-from rebody.training.high_level.train import HighLevelLearner, shaped
+from rebody.training.high_level import HighLevelConfig, HighLevelLearner, shaped
 from rebody.training.motion import decision
 from rebody.training.off_policy import initial_state
 from rebody.types import Subgoal
