@@ -11,7 +11,7 @@ from rebody.agents.rollout import Episodes, rollout_on_robot
 from rebody.bodies import RobotSpec
 from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
 from rebody.tasks.figures import final_error
-from rebody.types import DECISION_DT, Task
+from rebody.types import DECISION_DT, GlobalState, Task
 
 
 def act(
@@ -30,16 +30,23 @@ def act(
     return lasting, rollout_on_robot(agent, controller, spec, lasting, form, np.arange(size))
 
 
-def figures_of(tasks: Task, episodes: Episodes) -> dict[str, float]:
-    """Median and 95th percentile of the final error of each family [m, m/s, rad], return, share that fell."""
-    last = jax.tree.map(lambda leaf: leaf[-1], tasks)
-    errors, figures = final_error(last, episodes.state), {}
-    for family in np.unique(last.family):
-        of_family, name = errors[last.family == family], FAMILIES[family].name
+def errors_of(tasks: Task, states: GlobalState) -> dict[str, float]:
+    """Median and 95th percentile of the final error of each family [m, m/s, rad]; states are [decision, episode]."""
+    errors, figures = final_error(tasks, states), {}
+    for family in np.unique(tasks.family):
+        of_family, name = errors[tasks.family == family], FAMILIES[family].name
         figures[f"{name} median"] = float(np.median(of_family))
         figures[f"{name} p95"] = float(np.percentile(of_family, 95))
-    figures["return"] = float(np.sum(episodes.reward, axis=0).mean())
-    return figures | {"fell": float(np.mean(episodes.fell))}
+    return figures
+
+
+def figures_of(tasks: Task, episodes: Episodes) -> dict[str, float]:
+    """Errors on the last tasks of episodes, return, share that fell."""
+    errors = errors_of(jax.tree.map(lambda leaf: leaf[-1], tasks), episodes.state)
+    return errors | {
+        "return": float(np.sum(episodes.reward, axis=0).mean()),
+        "fell": float(np.mean(episodes.fell)),
+    }
 
 
 def rows_of(figures: Mapping[str, float], size: int, seconds: float) -> dict[str, str]:

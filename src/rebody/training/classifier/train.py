@@ -21,7 +21,9 @@ from rebody.store import load_artifact, tree_hash
 from rebody.tasks import family_names
 from rebody.training.card import save
 from rebody.training.classifier.config import ClassifierConfig
-from rebody.training.classifier.data import KNOWN_FROM, ToyWorld, act, slots_of_clusters
+from rebody.training.classifier.data import KNOWN_FROM, act, slots_of_clusters
+from rebody.training.descent import descend
+from rebody.training.inference.episodes import ToyWorld
 from rebody.training.run import Metrics, Run
 from rebody.types import AnyArray, Belief
 
@@ -72,11 +74,7 @@ def listen(module: Inference, world: ToyWorld, config: ClassifierConfig, key: PR
     parts = []
     for i, disturbed in enumerate((False, True)):
         tasks, disturbance = world.draw(
-            jax.random.fold_in(key, i),
-            config.episodes // 2,
-            config.decisions,
-            config.switch_share,
-            disturbed=disturbed,
+            jax.random.fold_in(key, i), config.episodes // 2, config.decisions, config.switch_share, disturbed=disturbed
         )
         parts.append((act(module, tasks, disturbance).belief, tasks.family))
     belief, family = jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=1), *parts)
@@ -96,19 +94,15 @@ def learn(
     state: RunState, seen: Beliefs, config: ClassifierConfig, key: PRNGKeyArray
 ) -> tuple[RunState, Float[Array, ""]]:
     """Updates on beliefs drawn from all; returns the mean loss."""
-    arrays, static = eqx.partition(state.classifier, eqx.is_array)
 
-    def step(carry, key):
-        arrays, optimiser = carry
+    def loss(classifier: SlotClassifier, key: PRNGKeyArray):
         chosen = jax.random.randint(key, (config.batch_size,), 0, len(seen.family))
-        some = jax.tree.map(lambda leaf: leaf[chosen], seen)
-        value, gradient = jax.value_and_grad(lambda a: cross_entropy(eqx.combine(a, static), some))(arrays)
-        updates, optimiser = _optimiser(config).update(gradient, optimiser)
-        return (eqx.apply_updates(arrays, updates), optimiser), value
+        value = cross_entropy(classifier, jax.tree.map(lambda leaf: leaf[chosen], seen))
+        return value, {"cross_entropy": value}
 
     keys = jax.random.split(key, config.updates)
-    (arrays, optimiser), values = jax.lax.scan(step, (arrays, state.optimiser), keys)
-    return RunState(eqx.combine(arrays, static), optimiser, state.iteration + 1), values.mean()
+    classifier, optimiser, metrics = descend(state.classifier, state.optimiser, _optimiser(config), loss, keys)
+    return RunState(classifier, optimiser, state.iteration + 1), metrics["cross_entropy"]
 
 
 def cross_entropy(classifier: SlotClassifier, seen: Beliefs) -> Float[Array, ""]:

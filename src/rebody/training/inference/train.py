@@ -28,6 +28,7 @@ from rebody.jax_settings import own_jax_settings
 from rebody.ranges import check_ranges
 from rebody.tasks import base_task
 from rebody.training.arrival import arrival_bonus
+from rebody.training.descent import descend
 from rebody.training.inference.clusters import refit
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, collect, refresh_beliefs, roles
@@ -165,13 +166,15 @@ def trained_parts(state: RunState, config: MetaConfig) -> InferenceParts:
         for policy, view in ((state.sac, config.policy_view), (state.privileged, config.told_view))
     )
     mixture = jax.tree.map(jnp.asarray, state.clusters.prior) if config.prior == "mixture" else None
-    return InferenceParts(state.module, by_belief, by_task, unfitted_probe(config), mixture)
+    return InferenceParts(
+        state.module, by_belief, by_task, unfitted_probe(config.inference.latent, config.tasks.families), mixture
+    )
 
 
-def unfitted_probe(config: MetaConfig) -> Probe:
+def unfitted_probe(latent: int, families: tuple[int, ...]) -> Probe:
     """A probe that reads nothing."""
-    weights = jnp.zeros((config.inference.latent + 1, len(config.tasks.families)))
-    return Probe(jnp.asarray(config.tasks.families), weights, weights)
+    weights = jnp.zeros((latent + 1, len(families)))
+    return Probe(jnp.asarray(families), weights, weights)
 
 
 @eqx.filter_jit
@@ -185,22 +188,13 @@ def update_inference(
     key: PRNGKeyArray,
 ) -> tuple[InferenceModule, optax.OptState, dict[str, Float[Array, ""]]]:
     """Steps of encoder and decoder on windows of stored episodes."""
-    arrays, static = eqx.partition(module, eqx.is_array)
 
-    def step(carry, key):
-        arrays, optimiser = carry
+    def loss_of(module: InferenceModule, key: PRNGKeyArray):
         sample_key, loss_key = jax.random.split(key)
         evidence = sample_evidence(replay, stored, config, sample_key)
-        gradient, metrics = jax.grad(
-            lambda a: loss(eqx.combine(a, static), evidence, prior, config.inference, loss_key),
-            has_aux=True,
-        )(arrays)
-        updates, optimiser = optimiser_of(config).update(gradient, optimiser)
-        return (eqx.apply_updates(arrays, updates), optimiser), metrics
+        return loss(module, evidence, prior, config.inference, loss_key)
 
-    keys = jax.random.split(key, config.inference_updates)
-    (arrays, optimiser), metrics = jax.lax.scan(step, (arrays, optimiser), keys)
-    return eqx.combine(arrays, static), optimiser, jax.tree.map(jnp.mean, metrics)
+    return descend(module, optimiser, optimiser_of(config), loss_of, jax.random.split(key, config.inference_updates))
 
 
 @eqx.filter_jit

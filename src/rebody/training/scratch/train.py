@@ -22,7 +22,7 @@ from rebody.agents.parts import ScratchParts, load_scratch
 from rebody.agents.rollout import Episodes as Rollouts
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.control import sac
-from rebody.control.flat import FlatPolicy, FlatView
+from rebody.control.flat import FlatPolicy
 from rebody.control.high_level import told_code
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.inference.module import InferenceModule
@@ -30,16 +30,10 @@ from rebody.inference.prior import SplitPrior, unit_gaussian
 from rebody.jax_settings import own_jax_settings
 from rebody.training.card import save
 from rebody.training.held_out import act, figures_of, rows_of
-from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, refresh_beliefs
 from rebody.training.inference.measure import contract_of, probe_of
-from rebody.training.inference.train import (
-    load_pretrained,
-    optimiser_of,
-    unfitted_probe,
-    update_inference,
-    with_tasks,
-)
+from rebody.training.inference.presets import goal_velocity
+from rebody.training.inference.train import load_pretrained, optimiser_of, unfitted_probe, update_inference, with_tasks
 from rebody.training.motion import decision, privileged_reward, put_on_feet
 from rebody.training.off_policy import ready_robot
 from rebody.training.replay import store_group
@@ -97,20 +91,19 @@ def train_scratch(
     with Run(
         out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume, finish=finish
     ) as run:
-        batch, meta = RobotBatch(spec, config.robots), config.meta(spec.reach)
-        state = run.restore(initial_state(config, meta, batch, jax.random.key(seed), init_from))
-        state = run.loop(state, lambda state: iterate(state, batch, config, meta, seed), config.iterations, "scratch")
-        return save_scratch(trained_parts(state, meta), spec, config, run)
+        batch = RobotBatch(spec, config.robots)
+        state = run.restore(initial_state(config, batch, jax.random.key(seed), init_from))
+        state = run.loop(state, lambda state: iterate(state, batch, config, seed), config.iterations, "scratch")
+        return save_scratch(trained_parts(state, config), spec, config, run)
 
 
-def iterate(
-    state: RunState, batch: RobotBatch, config: ScratchConfig, meta: MetaConfig, seed: int
-) -> tuple[RunState, Metrics]:
+def iterate(state: RunState, batch: RobotBatch, config: ScratchConfig, seed: int) -> tuple[RunState, Metrics]:
     """An episode of every robot, then updates of the module and of the policy, now and then an evaluation."""
-    iteration = int(state.iteration)
+    iteration, meta = int(state.iteration), config.meta(batch.spec.reach)
     rng = np.random.default_rng((seed, 2, iteration))
     keys = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration), 3)
-    fresh = collect(state.module, state.sac.actor, batch, config, meta, rng, keys[0])
+
+    fresh = collect(state, batch, config, rng, keys[0])
     replay, stored = store_group(state.replay, fresh, state.iteration)
     prior = SplitPrior(unit_gaussian, config.inference.kinds, config.inference.kind_weight)
     module, optimiser, metrics = update_inference(
@@ -122,32 +115,27 @@ def iterate(
     state = RunState(module, optimiser, policy, replay, state.iteration + 1)
     metrics |= learned | {"task_reward": fresh.episodes.reward.mean()}
     return state, measured(
-        metrics, iteration, config.evaluate_every, lambda: measure(trained_parts(state, meta), config, batch.spec)
+        metrics, iteration, config.evaluate_every, lambda: measure(trained_parts(state, config), config, batch.spec)
     )
 
 
 def collect(
-    module: InferenceModule,
-    actor: Actor,
-    batch: RobotBatch,
-    config: ScratchConfig,
-    meta: MetaConfig,
-    rng: np.random.Generator,
-    key: PRNGKeyArray,
+    state: RunState, batch: RobotBatch, config: ScratchConfig, rng: np.random.Generator, key: PRNGKeyArray
 ) -> Replay:
     """One group: every robot acts on a hidden task by what it believes, or by what it is told."""
     task_key, action_key = jax.random.split(key)
+    meta, encoder = config.meta(batch.spec.reach), state.module.encoder
     tasks = meta.tasks.sample_episodes(task_key, config.robots, config.decisions, config.switch_share)
     tasks = jax.tree.map(np.asarray, tasks)
     batch.reset(rng)
     batch.qpos[:, batch.spec.root_addresses[0]] = rng.uniform(-config.start, config.start, batch.size)
     here, first = batch.spec.observe(batch.qpos, batch.qpos), jax.tree.map(lambda leaf: leaf[:, 0], tasks)
-    known = begin_inference(module.encoder, here, first)
+    known = begin_inference(encoder, here, first)
     states, beliefs, actions, rewards, steps = [here], [known.belief], [], [], []
     for i in range(config.decisions):
         known = replace(known, task=jax.tree.map(lambda leaf: leaf[:, i], tasks))  # noqa: B023 (used at once)
-        now, held = hold(batch, known, module, actor, config, rng, jax.random.fold_in(action_key, i))
-        known, earned = infer(module.encoder, known, now, meta.reward)
+        now, held = act_for_a_decision(state, known, batch, config, rng, jax.random.fold_in(action_key, i))
+        known, earned = infer(encoder, known, now, meta.reward)
         steps += held
         states.append(known.state)
         beliefs.append(known.belief)
@@ -157,31 +145,23 @@ def collect(
     return Replay(Episodes(tasks, *along), jax.tree.map(lambda *rows: np.stack(rows), *steps))
 
 
-def hold(
-    batch: RobotBatch,
+def act_for_a_decision(
+    state: RunState,
     known: TaskInference,
-    module: InferenceModule,
-    actor: Actor,
+    batch: RobotBatch,
     config: ScratchConfig,
     rng: np.random.Generator,
     key: PRNGKeyArray,
 ) -> tuple[GlobalState, list[ControlSteps]]:
     """Control steps by the same belief; the state after them, and the steps."""
-    interpreted, steps = interpret(module, known, config), []
+    interpreted, steps = interpret(state.module, known, config), []
 
-    def control_step(step: int) -> None:
+    def control_step(i: int) -> None:
         joints, x, before = batch.joint_state(), batch.x.astype(np.float32), batch.qpos.copy()
-        action = _explore(actor, config, joints, x, interpreted, jax.random.fold_in(key, step))
-        batch.step(np.asarray(action))
-        seen = ControlSteps(
-            joints=joints,
-            x=x,
-            action=np.asarray(action),
-            reward=privileged_reward(batch, before, known.task, np.asarray(action), config.reward),
-            next_joints=batch.joint_state(),
-            next_x=batch.x.astype(np.float32),
-        )
-        steps.append(seen)
+        action = np.asarray(_explore(state.sac.actor, config, joints, x, interpreted, jax.random.fold_in(key, i)))
+        batch.step(action)
+        reward = privileged_reward(batch, before, known.task, action, config.reward)
+        steps.append(ControlSteps(joints, x, action, reward, batch.joint_state(), batch.x.astype(np.float32)))
         put_on_feet(batch, rng)
 
     return decision(batch, control_step)[0], steps
@@ -189,12 +169,7 @@ def hold(
 
 @eqx.filter_jit
 def update_policy(
-    policy: SACState,
-    module: InferenceModule,
-    replay: Replay,
-    stored,
-    config: ScratchConfig,
-    key: PRNGKeyArray,
+    policy: SACState, module: InferenceModule, replay: Replay, stored, config: ScratchConfig, key: PRNGKeyArray
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """Steps of soft actor-critic on stored control steps, with today's beliefs."""
     believed = module.decoder.interpret(replay.episodes.belief)
@@ -235,7 +210,7 @@ def sample_steps(
 
 
 def initial_state(
-    config: ScratchConfig, meta: MetaConfig, batch: RobotBatch, key: PRNGKeyArray, init_from: str | None = None
+    config: ScratchConfig, batch: RobotBatch, key: PRNGKeyArray, init_from: str | None = None
 ) -> RunState:
     """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
@@ -249,7 +224,7 @@ def initial_state(
         policy = sac.take_over(policy, parts.policy.actor, init_from)
     return RunState(
         module=module,
-        optimiser=optimiser_of(meta).init(eqx.filter(module, eqx.is_array)),
+        optimiser=optimiser_of(config.meta(batch.spec.reach)).init(eqx.filter(module, eqx.is_array)),
         sac=policy,
         replay=_no_replay(config, batch),
         iteration=jnp.zeros((), jnp.int32),
@@ -276,10 +251,11 @@ def _no_replay(config: ScratchConfig, batch: RobotBatch) -> Replay:
     )
 
 
-def trained_parts(state: RunState, meta: MetaConfig) -> ScratchParts:
+def trained_parts(state: RunState, config: ScratchConfig) -> ScratchParts:
     """What is kept of a run, its probe not yet fitted."""
-    policy = FlatPolicy(state.sac.averaged_actor, FlatView(meta.inference.places))
-    return ScratchParts(state.module, policy, unfitted_probe(meta))
+    families = goal_velocity().tasks.families
+    policy = FlatPolicy(state.sac.averaged_actor, config.view)
+    return ScratchParts(state.module, policy, unfitted_probe(config.inference.latent, families))
 
 
 @eqx.filter_jit

@@ -14,8 +14,8 @@ from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.robot import Reach
 from rebody.control.tracker import Tracker
 from rebody.tasks import FAMILIES, GOAL, VELOCITY, family_index
-from rebody.tasks.figures import final_error
 from rebody.training.card import save
+from rebody.training.held_out import errors_of
 from rebody.training.motion import decision
 from rebody.training.run import Run
 from rebody.training.tracker.config import TrackerConfig
@@ -42,12 +42,8 @@ def measure(tracker: Tracker, spec: RobotSpec, config: TrackerConfig) -> dict[st
     states, fell = run_robots(
         spec, len(command.slot), lambda batch: follow(controller, batch, command), config.held_out_s
     )
-    errors = final_error(Task(command.slot, command.value), states)
-    figures = {}
-    for name in tracker.slots:
-        of_slot = errors[: len(slot)][slot == family_index(name)]
-        figures[f"{name} median"] = float(np.median(of_slot))
-        figures[f"{name} p95"] = float(np.percentile(of_slot, 95))
+    asked, moved = jax.tree.map(lambda leaf: leaf[..., : len(slot)], (Task(command.slot, command.value), states))
+    figures = errors_of(asked, moved)
     figures["zero speed"] = float(np.abs(states.vx[-10:, len(slot) :]).mean())  # in the last second
     return figures | {"fell": float(fell.mean())}
 
