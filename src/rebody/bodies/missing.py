@@ -35,7 +35,9 @@ def leave_out_missing(spec: mujoco.MjSpec, robot: str) -> tuple[str, ...]:
     return files
 
 
-def _missing(spec: mujoco.MjSpec, assets, folder: str) -> dict[str, mujoco.MjsMesh | mujoco.MjsHField | mujoco.MjsTexture]:
+def _missing(
+    spec: mujoco.MjSpec, assets, folder: str
+) -> dict[str, mujoco.MjsMesh | mujoco.MjsHField | mujoco.MjsTexture]:
     """By name; where MuJoCo looks for them."""
     where = Path(spec.modelfiledir) / folder
     return {asset.name: asset for asset in assets if asset.file and not (where / asset.file).is_file()}
@@ -46,7 +48,7 @@ def _need(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> str | None:
     if geom.contype or geom.conaffinity:
         return "touches things with it"
     lowest, highest = spec.compiler.inertiagrouprange
-    weighs = geom.mass > 0 or geom.mass != geom.mass and geom.density > 0  # NaN where it is by density
+    weighs = geom.mass > 0 or (geom.mass != geom.mass and geom.density > 0)  # NaN where it is by density
     is_counted = spec.compiler.inertiafromgeom in _FROM_GEOMS and lowest <= geom.group <= highest
     has_own = spec.compiler.inertiafromgeom == _FROM_GEOMS[1] and geom.parent.explicitinertial
     if weighs and is_counted and not has_own and geom.parent.name != "world":

@@ -6,13 +6,13 @@ import equinox as eqx
 import jax
 import mujoco
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from rebody.bodies.simulation import Simulation
 from rebody.bodies.toy_models import toy_model
 from rebody.bodies.toys import Toy
 from rebody.jax_settings import own_jax_settings
-from rebody.types import POSE_FIELDS, GlobalState, global_state
+from rebody.types import POSE_FIELDS, AnyArray, global_state
 
 FIELDS = ("x", "z", "pitch", "vx", "vz", "pitch_rate")
 """What a nominal toy continues from; a state has them in this order."""
@@ -88,8 +88,8 @@ class PointMasses(Simulation):
 
 @eqx.filter_jit
 def _advance(
-    toy: Toy, state: Float[Array, "body field"], actions: Float[Array, "body action"]
-) -> Float[Array, "body field"]:
-    here: GlobalState = global_state(**{name: state[:, i] for i, name in enumerate(FIELDS)})
+    toy: Toy, state: Float[AnyArray, "body field"], actions: Float[AnyArray, "body action"]
+) -> Float[AnyArray, "body field"]:
+    here = global_state(**{name: state[:, i] for i, name in enumerate(FIELDS)})
     # a nominal toy has no noise, so its key does not matter
     return toy.observe(toy.step(toy.from_global(here), actions, jax.random.key(0))).select(FIELDS)

@@ -24,6 +24,7 @@ from rebody.types import ANGLES, DECISION_DT, GLOBAL_FIELDS, POSE_FIELDS, Global
 Floats = Float[np.ndarray, "..."]
 Root = Float[np.ndarray, "... root"]
 """The root's own numbers of qpos: all that a global state needs."""
+Amount = float | Floats
 Pose = Float[np.ndarray, "... 6"]
 """x, y, z [m], roll, pitch, yaw [rad], relative to the rest pose."""
 
@@ -76,7 +77,7 @@ class Readout(ABC):
         """All but where it is and where it heads: positions, then velocities of like size."""
 
     @abstractmethod
-    def place(self, qpos: Floats, qvel: Floats, x: Floats, y: Floats | None, yaw: Floats | None) -> None:
+    def place(self, qpos: Floats, qvel: Floats, x: Amount, y: Amount | None, yaw: Amount | None) -> None:
         """Put it there [m, rad], in place, as it stands and moves; None leaves what is."""
 
 
@@ -170,8 +171,8 @@ class FreeReadout(Readout):
         return np.asarray(in_heading(moved, self._yaw(before))[..., 0])
 
     def joint_state(self, qpos, qvel):
-        """z above the rest pose, up in the body's frame, all joints; then velocities: the root's in the heading's frame,
-        its turning in the body's. Bodies that float freely beside the robot are seen from where it is and heads.
+        """z above the rest pose, up in the body's frame, all joints; then velocities: the root's in the heading's
+        frame, its turning in the body's. Bodies that float freely beside the robot are seen from where it is and heads.
         """
         root = self.root(qpos)
         yaw, attitude = self._yaw(root), self._attitude(root)

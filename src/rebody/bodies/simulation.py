@@ -1,4 +1,4 @@
-"""What everything that simulates bodies can do, whatever moves them. Joint positions do not leave it but to be drawn."""
+"""What all simulations of bodies can do, whatever moves them; joint positions leave it only to be drawn or shown."""
 
 from abc import ABC, abstractmethod
 
@@ -10,7 +10,7 @@ from rebody.types import DECISION_DT, GlobalState
 
 Who = Bool[np.ndarray, " body"]
 """Which of the bodies are meant."""
-Amount = float | Float[np.ndarray, " chosen"]
+Amount = float | Float[np.ndarray, "..."]
 """One of each body that is meant, or the same for all."""
 Change = Float[np.ndarray, " body"] | Float[np.ndarray, "body 2"]
 
