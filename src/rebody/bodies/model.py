@@ -29,7 +29,7 @@ class Compiled:
 
     model: mujoco.MjModel
     keyframe: Float[np.ndarray, " nq"] | None
-    """Joint positions of the keyframe that was asked for; of a root that is held to the plane only the height counts."""
+    """Joint positions of the keyframe that was asked for; of a root that is held to the plane its height alone."""
     left_out: tuple[str, ...]
     """Files that were not there, and that nothing but the picture needs."""
 
@@ -56,17 +56,20 @@ def compile_model(
     if timestep is not None:
         spec.option.timestep = timestep
     key = None if keyframe is None else _key(spec, keyframe, robot)
+    held = root if space == "plane" and isinstance(root, str) else None
     if isinstance(root, str):
         joint = _free_joint(spec, root, robot)
-        if space == "plane":
-            _hold_to_plane(spec, root, joint)
+        if held:
+            _hold_to_plane(spec, held, joint)
     try:
         model, left_out = _compile(spec, robot)
-        if key is not None and isinstance(root, str) and space == "plane":
-            key = _held(key, model, root)
     except NOT_USED as error:
         raise RebodyError(f"robot '{robot}': MuJoCo cannot use '{mjcf}': {error}") from error
-    return Compiled(model, key, left_out)
+    if key is not None and len(key) != model.nq + (4 if held else 0):
+        raise RebodyError(
+            f"robot '{robot}': keyframe '{keyframe}' has {len(key)} joint positions, not as its model has."
+        )
+    return Compiled(model, _held(key, model, held) if key is not None and held else key, left_out)
 
 
 def _compile(spec: mujoco.MjSpec, robot: str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
@@ -96,8 +99,6 @@ def _key(spec: mujoco.MjSpec, name: str, robot: str) -> Float[np.ndarray, " nq"]
 def _held(key: Float[np.ndarray, " nq"], model: mujoco.MjModel, root: str) -> Float[np.ndarray, " held"]:
     """A keyframe of the floating body, for the one that is held: of its root the height."""
     first, height = int(model.joint(PLANE_JOINTS[0]).qposadr[0]), model.body(root).pos[2]
-    if len(key) - 7 != model.nq - 3:
-        raise ValueError(f"a keyframe has {len(key)} joint positions, and the model {model.nq + 4}.")
     return np.concatenate([key[:first], [0.0, key[first + 2] - height, 0.0], key[first + 7 :]])
 
 

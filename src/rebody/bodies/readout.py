@@ -116,7 +116,7 @@ class PlanarReadout(Readout):
         return np.asarray(root[..., 0] - before[..., 0])
 
     def joint_state(self, qpos, qvel):
-        """Positions without x, pitch wrapped. Bodies that float freely beside the robot stand at their x ahead of it."""
+        """Positions without x, pitch wrapped; bodies that float freely beside the robot are at their x ahead of it."""
         x, _, pitch = self.addresses
         positions = qpos.copy()
         positions[..., self._free] -= qpos[..., [x]]
