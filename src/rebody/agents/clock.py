@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from rebody.agents.agent import Agent, Carry, Command, Observation
-from rebody.bodies import RobotBatch
+from rebody.bodies import Simulation
 from rebody.control.command import addressed, relative
 from rebody.control.step_predictor import StepPredictor
 from rebody.types import AnyArray, GlobalState, Pose, Subgoal
@@ -29,7 +29,7 @@ class Clock(eqx.Module):
         """A decision of the episodes that are due."""
 
     @abstractmethod
-    def steps(self, batch: RobotBatch, subgoal: Subgoal) -> Int[np.ndarray, " episode"]:
+    def steps(self, body: Simulation, subgoal: Subgoal) -> Int[np.ndarray, " episode"]:
         """Control steps to the next decision of an episode that decided on that subgoal just now."""
 
 
@@ -46,9 +46,9 @@ class EvenClock(Clock):
         """`Agent.decide`: all are due."""
         return decide(agent, carry, observation)
 
-    def steps(self, batch, subgoal):
+    def steps(self, body, subgoal):
         """Always the same."""
-        return np.full(batch.size, self.every)
+        return np.full(body.size, self.every)
 
 
 class PredictedClock(Clock):
@@ -66,10 +66,10 @@ class PredictedClock(Clock):
         """Those that are not due keep memory and command."""
         return _decide_each(agent, carry, observation, due)
 
-    def steps(self, batch, subgoal):
+    def steps(self, body, subgoal):
         """What the predictor says."""
-        asked = addressed(subgoal, self.slots)
-        return np.asarray(_predict(self.predictor, batch.tracker_state(), batch.spec.pose(batch.qpos), asked))
+        asked, pose = addressed(subgoal, self.slots), body.pose().astype(np.float32)
+        return np.asarray(_predict(self.predictor, body.proprioception(), pose, asked))
 
 
 @eqx.filter_jit

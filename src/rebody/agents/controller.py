@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from rebody.bodies import RobotBatch
+from rebody.bodies import Simulation
 from rebody.control.command import Command, addressed, relative, slots_among
 from rebody.control.flat import FlatPolicy
 from rebody.control.tracker import Tracker
@@ -22,7 +22,7 @@ class Controller(eqx.Module):
     """(what it sees of the body, pose, subgoal, belief) -> joint action; each kind looks at what it needs."""
 
     @abstractmethod
-    def see(self, batch: RobotBatch) -> Float[np.ndarray, "robot joint"]:
+    def see(self, body: Simulation) -> Float[np.ndarray, "robot joint"]:
         """What it sees of each robot's body."""
 
     @abstractmethod
@@ -46,9 +46,9 @@ class TrackerController(Controller):
         self.tracker, self.goal_ahead = tracker, goal_ahead
         self.slots = slots_among(families or tracker.families, tracker.families)
 
-    def see(self, batch):
+    def see(self, body):
         """The joint state, and the filtered speed where there is one."""
-        return batch.tracker_state()
+        return body.proprioception()
 
     def __call__(self, joints, pose, subgoal, belief):
         """A place is made relative to where the robot is now."""
@@ -69,9 +69,9 @@ class FlatController(Controller):
     policy: FlatPolicy
     decoder: Decoder
 
-    def see(self, batch):
+    def see(self, body):
         """The joint state."""
-        return batch.joint_state()
+        return body.joint_state()
 
     def __call__(self, joints, pose, subgoal, belief):
         """There is no subgoal."""

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Int
 
 from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import follow
-from rebody.bodies import RobotBatch, RobotSpec
+from rebody.bodies import RobotBatch, RobotSpec, Simulation
 from rebody.control.command import Command, absolute
 from rebody.control.places import UNBOUNDED
 from rebody.control.tracker import Tracker
@@ -66,7 +66,7 @@ def stress(tracker: Tracker, spec: RobotSpec, episodes: int, seed: int = 0) -> S
     return StressResult(fell, batch.fallen.copy())
 
 
-def _subgoals(tracker: Tracker, batch: RobotBatch, rng: np.random.Generator) -> Subgoal:
+def _subgoals(tracker: Tracker, batch: Simulation, rng: np.random.Generator) -> Subgoal:
     """One of each robot, within reach of where it is."""
     families = tracker.families
     values = np.zeros((len(families), batch.size, families.size), np.float32)
@@ -74,5 +74,5 @@ def _subgoals(tracker: Tracker, batch: RobotBatch, rng: np.random.Generator) -> 
         values[i, :, : family.size] = rng.uniform(family.range.low, family.range.high, (batch.size, family.size))
     slot = rng.integers(len(families), size=batch.size)
     # places and headings from where it is, all else as it stands
-    here = batch.spec.pose(batch.qpos) * np.isin(POSE_FIELDS, UNBOUNDED)
+    here = batch.pose().astype(np.float32) * np.isin(POSE_FIELDS, UNBOUNDED)
     return absolute(families, Command(slot, values[slot, np.arange(batch.size)]), here)

@@ -149,8 +149,7 @@ class Page:
     def _show(self, now: float) -> None:
         """Bring the page up to date with the session."""
         session = self.session
-        pose = session.previous_pose + self._pace.share * (session.pose - session.previous_pose)
-        x = float(pose[session.body.x_address])
+        pose, x = session.between(self._pace.share)
         moment = session.moments[-1] if session.moments else None
         self._scene.show_body(pose, x)
         self._scene.show_marks(session.task, moment, x)
