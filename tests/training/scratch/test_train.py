@@ -39,14 +39,14 @@ def meta(config, cheetah):
 
 
 @pytest.fixture(scope="module")
-def state(config, meta, cheetah):
-    return initial_state(config, meta, RobotBatch(cheetah, ROBOTS), jax.random.key(0))
+def state(config, cheetah):
+    return initial_state(config, RobotBatch(cheetah, ROBOTS), jax.random.key(0))
 
 
 @pytest.fixture(scope="module")
-def group(config, meta, state, cheetah):
+def group(config, state, cheetah):
     batch = RobotBatch(cheetah, ROBOTS)
-    return collect(state.module, state.sac.actor, batch, config, meta, np.random.default_rng(0), jax.random.key(0))
+    return collect(state, batch, config, np.random.default_rng(0), jax.random.key(0))
 
 
 def test_tasks_are_within_reach_and_starts_anywhere(group, meta):
@@ -84,11 +84,11 @@ def test_the_module_hears_the_tasks_own_reward_and_the_beliefs_are_its_own(group
     np.testing.assert_array_equal(episodes.belief.mean[:, 0], 0.0)
 
 
-def test_going_to_a_goal_is_paid_by_how_well_its_speed_is_held(config, meta, state, cheetah):
+def test_going_to_a_goal_is_paid_by_how_well_its_speed_is_held(config, state, cheetah):
     """Wanted is 1.5 times what is left a second, at most 3 m/s."""
     still = replace(config, switch_share=0.0)
     batch = RobotBatch(cheetah, ROBOTS)
-    group = collect(state.module, state.sac.actor, batch, still, meta, np.random.default_rng(0), jax.random.key(3))
+    group = collect(state, batch, still, np.random.default_rng(0), jax.random.key(3))
     steps, is_goal = group.steps, group.episodes.task.family[:, 0] == GOAL
     assert is_goal.any()
     left = (group.episodes.task.target[:, 0] - steps.next_x)[:, is_goal]
