@@ -65,10 +65,10 @@ def compile_model(
         model, left_out = _compile(spec, robot)
     except NOT_USED as error:
         raise RebodyError(f"robot '{robot}': MuJoCo cannot use '{mjcf}': {error}") from error
-    if key is not None and len(key) != model.nq + (4 if held else 0):
-        raise RebodyError(
-            f"robot '{robot}': keyframe '{keyframe}' has {len(key)} joint positions, not as its model has."
-        )
+    has = model.nq + (4 if held else 0)
+    if key is not None and len(key) != has:
+        says = f"keyframe '{keyframe}' has {len(key)} joint positions, and its model {has}"
+        raise RebodyError(f"robot '{robot}': {says}.")
     return Compiled(model, _held(key, model, held) if key is not None and held else key, left_out)
 
 
