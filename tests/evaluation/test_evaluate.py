@@ -282,6 +282,7 @@ def of_another_module(trial):
     return replace(trial.flat, inference_hash="0" * 64)
 
 
+SEES_YAW = Contract(("yaw",), 6, {"goal": (-9.0, 9.0)}, "plain")
 REFUSED = {
     "was trained on 'cheetah', not on 'hopper'": lambda trial: (
         replace(trial, robot=replace(load_robot("cheetah"), name="hopper")), SPECS,
@@ -314,7 +315,7 @@ REFUSED = {
     ),
     "unknown agent 'resue'": lambda trial: (replace(trial, agent="resue"), SPECS),
     "its encoder sees yaw, which 'cheetah' does not have": lambda trial: (
-        replace(trial, inference=replace(trial.inference, contract=Contract(("yaw",), 6, {"goal": (-9.0, 9.0)}, "plain"))),
+        replace(trial, inference=replace(trial.inference, contract=SEES_YAW)),
         SPECS,
     ),
 }  # fmt: skip
