@@ -12,8 +12,8 @@ from rebody.cli.main import run
 from rebody.store import load_artifact, tree_hash
 from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.training.classifier import ClassifierConfig
-from rebody.training.classifier.data import ToyWorld
 from rebody.training.classifier.train import Beliefs, cross_entropy, initial_state, iterate
+from rebody.training.inference.episodes import ToyWorld
 from rebody.types import Belief
 
 FLAGS = "--episodes 4 --decisions 30 --held-out 6 --iterations 3 --updates 2 --batch-size 8 --hidden 4"
