@@ -79,7 +79,7 @@ class Learner(ABC, Generic[World]):
     @abstractmethod
     def collect(
         self, state: OffPolicyState[World], batch: RobotBatch, rng: np.random.Generator, key: PRNGKeyArray
-    ) -> tuple[World, Metrics]:
+    ) -> tuple[World, dict[str, Any]]:
         """Move robots by `config.steps`, append to the replay buffer; returns the world then, and what was earned."""
 
     @abstractmethod

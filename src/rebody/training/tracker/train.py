@@ -22,7 +22,7 @@ from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
 from rebody.training.motion import LastDecision, motion_of, no_command, tracker_features
 from rebody.training.off_policy import Learner, OffPolicyState, learn, ready_robot, train
-from rebody.training.run import Metrics, Run
+from rebody.training.run import Run
 from rebody.training.tracker.commands import Share
 from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.orders import Orders, commands, follow_guides, no_orders, renew
@@ -96,7 +96,7 @@ class TrackerLearner(Learner[World]):
 
     def collect(
         self, state: OffPolicyState[World], batch: RobotBatch, rng: np.random.Generator, key: PRNGKeyArray
-    ) -> tuple[World, Metrics]:
+    ) -> tuple[World, dict[str, Any]]:
         """Control steps under orders; what they earned, and how often robots fell."""
         config, spec, orders, last = self.config, self.spec, state.world.orders, state.world.last
         lasting = schedule(config, int(state.iteration), spec.control_dt)
@@ -113,7 +113,7 @@ class TrackerLearner(Learner[World]):
             state.replay.append(seen)
             begin_anew(state.world, batch, batch.fallen | (orders.age >= lasting.trajectory), rng)
         newest = state.replay.newest(config.steps * config.robots)
-        return state.world, jax.tree.map(float, experience(newest, config, spec.control_dt))
+        return state.world, experience(newest, config, spec.control_dt)
 
     def update(self, policy: SACState, drawn: Any, key: PRNGKeyArray, iteration: int) -> tuple[SACState, dict]:
         """Half of every batch learns under commands that were never given."""
