@@ -57,7 +57,8 @@ def _reached(axes: Axes, run: BeliefOverTime, family: Family) -> None:
     else:
         for i, name in enumerate(components(family)):
             shade = SHADES[i % len(SHADES)]
-            axes.plot(run.time_s[is_believed], believed[:, i], ".", color=family.colour, alpha=shade, label=label + name)
+            belief = {"color": family.colour, "alpha": shade, "label": label + name}
+            axes.plot(run.time_s[is_believed], believed[:, i], ".", **belief)
             if reached.size:
                 axes.plot(run.decisions.time_s, reached[:, i], color=TRUTH, alpha=shade, lw=1.2, label=f"robot{name}")
         axes.set(ylabel=f"{family.name} [{family.unit}]" if others else COLUMNS.get(first, first))
