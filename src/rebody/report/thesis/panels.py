@@ -14,6 +14,7 @@ from rebody.report.style import BELIEF, TASKS, TRUTH
 from rebody.report.thesis.data import Data, split
 from rebody.tasks import Family
 from rebody.tasks.line import GOAL, JUMP, LINE, STAND, VELOCITY
+from rebody.types import Task
 
 Panel = Callable[[Axes, Data], Any]
 
@@ -141,8 +142,8 @@ def points(name: str, title: str = "", behind: str | None = None) -> Panel:
 
 def labels(log: Data) -> list[tuple[str, str]]:
     """Family and direction of each episode's task."""
-    tasks = [(LINE[index], target) for index, target in zip(log["family"], log["target"], strict=True)]
-    return [(family.name, family.direction_names[int(family.direction([target]))]) for family, target in tasks]
+    names = [(family.name, direction) for family in LINE for direction in family.direction_names]
+    return [names[number] for number in LINE.base_task(Task(log["family"], log["target"][:, None]))]
 
 
 # the toy
