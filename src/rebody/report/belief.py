@@ -52,8 +52,7 @@ def _reached(axes: Axes, run: BeliefOverTime, family: Family) -> None:
     if is_plane(family):
         axes.plot(*believed.T, ".", color=family.colour, label=label)
         axes.plot(*reached.T, color=TRUTH, lw=1.2, label="robot")
-        set_plane(axes, family, xlim=_ends(family, reached[:, :1], believed[:, :1]))
-        axes.set(ylim=_ends(family, reached[:, 1:], believed[:, 1:]))
+        set_plane(axes, family, *(_ends(family, reached[:, i], believed[:, i]) for i in (0, 1)))
     else:
         for i, name in enumerate(components(family)):
             shade = SHADES[i % len(SHADES)]

@@ -62,7 +62,7 @@ def draw_progress(axes: Axes, episode: EpisodeResult, family: Family, until: int
         axes.plot(*wanted.T, "x", color=TRUTH, label="hidden target")
         axes.plot(*read[:until].T, ".", color=BELIEF, ms=4, label="read from the belief")
         axes.plot(*reached[:until].T, color=MOTION, lw=1.5, label="robot")
-        set_plane(axes, family, xlim=ends[0], ylim=ends[1])
+        set_plane(axes, family, *ends)
     else:
         for i, name in enumerate(components(family)):
             shade = SHADES[i % len(SHADES)]
@@ -84,10 +84,12 @@ def is_plane(family: Family) -> bool:
     return family.size == 2 and set(family.quantity.components) <= set(POSE_FIELDS[:3])
 
 
-def set_plane(axes: Axes, family: Family, **settings: Any) -> None:
-    """As long in one direction as in the other."""
+def set_plane(axes: Axes, family: Family, *ends: tuple[float, float]) -> None:
+    """A metre as long in one direction as in the other, with these ends at least, if any are given."""
     across, up = (f"{name} [{family.unit}]" for name in family.quantity.components)
-    axes.set(xlabel=across, ylabel=up, **settings)
+    axes.set(xlabel=across, ylabel=up)
+    for set_ends, own in zip((axes.set_xlim, axes.set_ylim), ends, strict=False):
+        set_ends(*own, auto=True)
     axes.set_aspect("equal", adjustable="datalim")
 
 
