@@ -61,8 +61,15 @@ def run_of(fields, names, latent=3, clusters=0):
         run_of(("x", "pitch"), ["lean"]),
         run_of(("pitch",), ["lean", "place"]),
     ],
-    ids=["one family, one number", "two families", "three families", "a velocity that is not seen", "a plane",
-         "a vector", "vectors that are not seen"],
+    ids=[
+        "one family, one number",
+        "two families",
+        "three families",
+        "a velocity that is not seen",
+        "a plane",
+        "a vector",
+        "vectors that are not seen",
+    ],
 )
 def test_drawn_whole(run, tmp_path):
     path = tmp_path / "new" / "belief.png"

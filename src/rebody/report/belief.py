@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rebody.evaluation.logs import COLUMNS, BeliefOverTime
-from rebody.report.figures import SHADES, components, is_plane, set_plane
-from rebody.report.style import TRUTH, as_text, figure
+from rebody.report.figures import components, is_plane, set_plane
+from rebody.report.style import SHADES, TRUTH, as_text, figure
 from rebody.tasks import Family
 from rebody.types import global_state
 

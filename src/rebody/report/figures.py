@@ -10,13 +10,11 @@ from matplotlib.axes import Axes
 
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.results import Results
-from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, TASKS, TRUTH, as_text, figure
+from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, SHADES, TASKS, TRUTH, as_text, figure
 from rebody.tasks import Family
 from rebody.tasks.family_set import fit
 from rebody.types import POSE_FIELDS
 
-SHADES = (1.0, 0.6, 0.4, 0.25)
-"""Opacity of a vector's components, by turns."""
 MARKERS = "os^vD"
 """Of a vector's components, by turns."""
 

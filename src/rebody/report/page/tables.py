@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from rich.table import Table
 from rich.text import Text
@@ -61,7 +62,7 @@ def _task(episode: EpisodeResult) -> str:
     return f"{text}, from {at_s:g} s {family} {_vector(numbers)}"
 
 
-def _vector(numbers: Sequence[float], form: str = "+.3g") -> str:
+def _vector(numbers: Sequence[Any], form: str = "+.3g") -> str:
     return ", ".join(format(number, form) for number in numbers)
 
 
