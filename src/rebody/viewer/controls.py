@@ -204,10 +204,10 @@ class Controls:
 
 
 def _in_tenths(box: Box) -> Box:
-    """Ends that a slider can be put to; those of the box where there are none."""
+    """Ends that a slider can be put to; those of the box where little is left between them."""
     low = tuple(math.ceil(10 * end) / 10 for end in box.low)
     high = tuple(math.floor(10 * end) / 10 for end in box.high)
-    return Box(low, high) if all(map(operator.le, low, high)) else box
+    return Box(low, high) if all(map(operator.lt, low, high)) else box
 
 
 def _push(button: str) -> Push:
