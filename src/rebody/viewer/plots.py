@@ -135,7 +135,7 @@ def _lines(i: int) -> tuple[uplot.Series, uplot.Series, uplot.Series]:
 
 def _label(family: Family) -> str:
     """What a family is about."""
-    names = f"{', '.join(family.quantity.components)} (ever paler)"
+    names = f"{', '.join(family.quantity.components)} (paler)"
     return f"{family.quantity.label if family.size == 1 else names} [{family.unit}]"
 
 
