@@ -5,7 +5,6 @@ Then what many tests share: tiny parts, most of them untrained, and command line
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
@@ -26,7 +25,6 @@ import pytest  # noqa: E402
 from rebody.agents.configs import InferenceSettings  # noqa: E402
 from rebody.agents.parts import Inference, LoadedFlat, LoadedTracker, inference_template  # noqa: E402
 from rebody.bodies import load_robot  # noqa: E402
-from rebody.bodies.robot import Reach  # noqa: E402
 from rebody.bodies.toys import MassDamper  # noqa: E402
 from rebody.cli.main import run  # noqa: E402
 from rebody.control.flat import FlatPolicy, FlatView  # noqa: E402
@@ -36,19 +34,18 @@ from rebody.control.tracker import Tracker  # noqa: E402
 from rebody.evaluation.evaluate import Trial  # noqa: E402
 from rebody.inference.contract import Contract  # noqa: E402
 from rebody.inference.probe import Probe  # noqa: E402
+from rebody.ranges import interval  # noqa: E402
 from rebody.store import tree_hash  # noqa: E402
 from rebody.store.typed import typed  # noqa: E402
-from rebody.training.flat import report as flat_report  # noqa: E402
-from rebody.training.high_level import report as high_level_report  # noqa: E402
-from rebody.training.inference import measure as inference_measure  # noqa: E402
-from rebody.training.inference import report as inference_report  # noqa: E402
-from rebody.training.inference import train as inference_train  # noqa: E402
-from rebody.training.scratch import report as scratch_report  # noqa: E402
-from rebody.training.step_predictor import report as step_report  # noqa: E402
-from rebody.training.tracker import report as tracker_report  # noqa: E402
+from rebody.tasks import SHIPPED, FamilySet  # noqa: E402
+from rebody.tasks.line import GOAL, VELOCITY  # noqa: E402
 
 WINDOW, SECONDS = 6, 3.0
 JOINTS, ACTIONS = 17, 6  # of a cheetah
+HEARD = FamilySet((GOAL.within(interval(-10.0, 10.0), law="plain"),))
+"""What the tiny module tells apart."""
+COMMANDS = FamilySet((GOAL.within(interval(-5.0, 5.0)), VELOCITY.within(interval(-3.0, 3.0))))
+"""What the tiny tracker can be commanded to do."""
 
 MAPS = Path("/proc/self/maps")
 MOST_MAPS = 20_000
@@ -70,7 +67,7 @@ def _few_memory_maps() -> Iterator[None]:
 def stored_config():
     """What an inference artifact's config.json says of its parts."""
     return {
-        "contract": asdict(Contract(("x",), WINDOW, {"goal": (-10.0, 10.0)}, "plain")),
+        "contract": asdict(Contract(("x",), WINDOW, HEARD)),
         "inference": {"units": 8, "window": WINDOW, "latent": 2},
         "high_level": {"fields": ["x", "vx"], "scales": [10.0, 3.5], "hidden": [8], "projections": 0},
         "toy": {"kind": "mass-damper", "mass": 1.0, "damping": 2.0, "max_force": 7.0},
@@ -82,7 +79,7 @@ def inference(stored_config):
     settings = typed(stored_config, InferenceSettings)
     parts = eqx.filter_jit(lambda: inference_template(settings))()
     weights = [parts.high_level.actor.net.mlp.weights[-1], parts.told_policy.actor.net.mlp.weights[-1]]
-    probe = Probe(np.zeros(1, np.int32), np.zeros((3, 1), np.float32), np.array([[2.0], [-1.0], [0.5]], np.float32))
+    probe = Probe(np.zeros((3, 1), np.float32), np.array([[2.0], [-1.0], [0.5]], np.float32), HEARD)
     parts = eqx.tree_at(
         lambda p: (p.high_level.actor.net.mlp.weights[-1], p.told_policy.actor.net.mlp.weights[-1], p.probe),
         parts,
@@ -103,7 +100,7 @@ def lively_actor(observations: int, seed: int, actions: int = ACTIONS) -> Actor:
 
 @pytest.fixture(scope="session")
 def tracker():
-    return Tracker(lively_actor(JOINTS + 6, 1), Reach(speed=(-3.0, 3.0)))
+    return Tracker(lively_actor(JOINTS + 6, 1), COMMANDS)
 
 
 @pytest.fixture(scope="session")
@@ -113,7 +110,7 @@ def flat_policy():
 
 @pytest.fixture(scope="session")
 def step_predictor(tracker):
-    return StepPredictor(lively_actor(JOINTS + 6, 3, actions=1), tracker.reach)
+    return StepPredictor(lively_actor(JOINTS + 6, 3, actions=1), tracker.families)
 
 
 @pytest.fixture(scope="session")
@@ -137,6 +134,7 @@ def trial(inference, tracker, flat_policy, cheetah):
     return Trial(
         agent="reuse",
         inference=inference,
+        families=SHIPPED,
         robot=cheetah,
         tracker=LoadedTracker("tiny-tracker", "cheetah", tracker),
         flat=LoadedFlat("tiny-flat", "cheetah", tree_hash(inference.parts.module), flat_policy),
@@ -151,6 +149,7 @@ FLAGS = {
     "tracker": """
         train tracker cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60
         --sac.hidden 8 8 --sac.batch-size 8
+        --held-out 4 --held-out-s 3
     """,
     "inference": """
         train inference position --episodes 8 --decisions 24 --groups 2
@@ -158,23 +157,28 @@ FLAGS = {
         --inference.units 8 --inference.window 4 --inference.batch-size 4 --inference.decoded 2
         --sac.hidden 8 8 --sac.projections 2 --sac.batch-size 8
         --prior mixture --mixture.from-iteration 1 --mixture.points 60
+        --held-out 8 --held-out-at-end 8 --held-out-s 6
     """,
     "flat": """
         train flat --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5
         --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
+        --held-out 3 --held-out-s 3
     """,
     "scratch": """
         train scratch --robot cheetah --robots 4 --decisions 6 --groups 2 --iterations 9
         --inference-updates 2 --policy-updates 2 --inference.units 8 --inference.window 4 --inference.batch-size 4
         --inference.decoded 2 --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
+        --held-out 4 --held-out-s 3
     """,
     "high-level": """
         train high-level --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5
         --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
+        --held-out 3 --held-out-s 3
     """,
     "step-predictor": """
         train step-predictor --robot cheetah --robots 4 --steps 20 --updates 2 --iterations 9 --replay 60
         --sac.hidden 8 8 --sac.batch-size 8
+        --held-out 8 --held-out-s 2
     """,
 }
 FULL = f"""
@@ -186,38 +190,11 @@ FULL = f"""
 """Beside those of `inference`, all that a module can have: three families, a carried state, a split latent, labels."""
 
 
-@contextmanager
-def in_short() -> Iterator[pytest.MonkeyPatch]:
-    """While inside, what was trained is measured in short."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(tracker_report, "COMMANDS", 4)
-        patched.setattr(tracker_report, "SECONDS", 3.0)
-        patched.setattr(inference_report, "HELD_OUT", 8)
-        patched.setattr(inference_train, "HELD_OUT", 8)
-        patched.setattr(inference_measure, "DECISIONS", 60)
-        patched.setattr(flat_report, "TASKS", 3)
-        patched.setattr(flat_report, "DECISIONS", 30)
-        patched.setattr(scratch_report, "TASKS", 4)
-        patched.setattr(scratch_report, "DECISIONS", 30)
-        patched.setattr(high_level_report, "TASKS", 3)
-        patched.setattr(high_level_report, "DECISIONS", 30)
-        patched.setattr(step_report, "ROBOTS", 8)
-        patched.setattr(step_report, "SECONDS", 2.0)
-        yield patched
-
-
-@pytest.fixture
-def measured_in_short() -> Iterator[None]:
-    with in_short():
-        yield
-
-
 @pytest.fixture(scope="session")
 def own_module(tmp_path_factory) -> Path:
     """Folder of an inference module."""
     folder = tmp_path_factory.mktemp("trained") / "inference"
-    with in_short():
-        assert run([*FLAGS["inference"].split(), "--out", str(folder)]) == 0
+    assert run([*FLAGS["inference"].split(), "--out", str(folder)]) == 0
     return folder
 
 
@@ -225,8 +202,7 @@ def own_module(tmp_path_factory) -> Path:
 def own_tracker(own_module) -> Path:
     """Folder of a tracker."""
     folder = own_module.with_name("tracker")
-    with in_short():
-        assert run([*FLAGS["tracker"].split(), "--out", str(folder)]) == 0
+    assert run([*FLAGS["tracker"].split(), "--out", str(folder)]) == 0
     return folder
 
 
@@ -234,8 +210,7 @@ def own_tracker(own_module) -> Path:
 def full_module(tmp_path_factory) -> Path:
     """Folder of an inference module of the full toy."""
     folder = tmp_path_factory.mktemp("trained") / "full"
-    with in_short():
-        assert run([*FULL.split(), "--out", str(folder)]) == 0
+    assert run([*FULL.split(), "--out", str(folder)]) == 0
     return folder
 
 
@@ -252,7 +227,6 @@ def tiny_training(own_module, own_tracker) -> dict[str, list[str]]:
 def trained(own_module, tiny_training) -> dict[str, Path]:
     """Folders of a module, a tracker, the policies that hear that module, and that tracker's step predictor."""
     folders = {kind: own_module.with_name(kind) for kind in tiny_training}
-    with in_short():
-        for kind in ("flat", "scratch", "high-level", "step-predictor"):
-            assert run([*tiny_training[kind], "--out", str(folders[kind])]) == 0
+    for kind in ("flat", "scratch", "high-level", "step-predictor"):
+        assert run([*tiny_training[kind], "--out", str(folders[kind])]) == 0
     return folders
