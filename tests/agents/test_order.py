@@ -70,7 +70,10 @@ def reordered_module(artifact, order):
     for policy in ("high_level", "told_policy"):
         seen = np.concatenate([np.arange(FIELDS), FIELDS + blocks(np.arange(4 * len(order)), order)])
         change(f"{policy}.actor.net.multi_scale.projection", lambda w, seen=seen: w[seen])
-        change(f"{policy}.actor.net.mlp.weights.0", lambda w, seen=seen: np.concatenate([w[: len(seen)][seen], w[len(seen) :]]))
+        change(
+            f"{policy}.actor.net.mlp.weights.0",
+            lambda w, seen=seen: np.concatenate([w[: len(seen)][seen], w[len(seen) :]]),
+        )
     return config, arrays
 
 

@@ -250,7 +250,9 @@ class Deaf(eqx.Module):
 
 
 def test_bayes_finds_goals_on_the_toy(inference):
-    episodes = rollout_on_toy(build_agent("bayes", inference), inference.toy, lasting(*TARGETS), inference.contract.families)
+    episodes = rollout_on_toy(
+        build_agent("bayes", inference), inference.toy, lasting(*TARGETS), inference.contract.families
+    )
     np.testing.assert_allclose(episodes.subgoal.value[-1, :, 0], TARGETS, atol=0.011)
     np.testing.assert_array_equal(episodes.subgoal.slot, np.zeros((WINDOW, 3)))
 

@@ -50,9 +50,7 @@ def loaded(module):
     families = module.contract.families.names
     net = MLP(module.parts.module.encoder.latent, len(families), (), key=jax.random.key(0))
     of_cluster = np.full(len(module.parts.mixture.active), STAND, np.int32)
-    return LoadedSlots(
-        "tiny", tree_hash(module.parts.module), families, SlotParts(SlotClassifier(net), of_cluster)
-    )
+    return LoadedSlots("tiny", tree_hash(module.parts.module), families, SlotParts(SlotClassifier(net), of_cluster))
 
 
 def test_one_family_needs_no_choice(belief):

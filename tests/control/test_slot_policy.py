@@ -65,7 +65,9 @@ def test_there_is_a_slot_for_each_family_of_the_module(names):
 
 
 def test_a_slot_of_several_numbers_has_as_many_scales():
-    place = FamilySet((dataclasses.replace(GOAL, quantity=XY, targets=(Box((-5.0, -1.0, -3.0), (4.0, 2.0, 1.0)),), directions=()),))
+    place = FamilySet(
+        (dataclasses.replace(GOAL, quantity=XY, targets=(Box((-5.0, -1.0, -3.0), (4.0, 2.0, 1.0)),), directions=()),)
+    )
     assert slots_within(place, place) == (Place(XY, (5.0, 2.0, 3.0)),)
 
 

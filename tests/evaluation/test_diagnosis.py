@@ -10,6 +10,7 @@ from rich.console import Console
 from rebody.evaluation.diagnosis import LADDER, Diagnosis, diagnose, diagnoses_among, diagnosis_tables, shares_of
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.results import Results
+from rebody.report.diagnosis import plot_diagnosis
 from rebody.tasks import SHIPPED, FamilySet, Quantity
 from rebody.tasks.line import GOAL
 from rebody.ranges import Box
@@ -122,7 +123,6 @@ def test_every_agent_does_the_same_tasks(trial, tmp_path):
     text = console.export_text()
     assert all(what in text for what in (*LADDER.values(), "idle: stands still"))
     assert f"{diagnosis.results['bayes'].summary['families']['goal']['median_error']['value']:.3f}" in text
-    plot_diagnosis = pytest.importorskip("rebody.report.diagnosis").plot_diagnosis
     plot_diagnosis(diagnosis, tmp_path / "d.png")
     assert (tmp_path / "d.png").stat().st_size > 10_000
 

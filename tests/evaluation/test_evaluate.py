@@ -65,9 +65,7 @@ def test_the_task_changes_at_its_moment(results):
         late = np.array(episode.time_s) > 1.2 + 1e-9
         target = np.array(episode.active_target)[:, 0]
         np.testing.assert_array_equal(target, np.where(late, -3.0, 1.0))
-        np.testing.assert_allclose(
-            episode.reward, -np.abs(np.array(episode.quantities["x"]) - target), atol=1e-4
-        )
+        np.testing.assert_allclose(episode.reward, -np.abs(np.array(episode.quantities["x"]) - target), atol=1e-4)
         x = np.array(episode.quantities["x"])[-20:]
         assert episode.final_error == pytest.approx(np.abs(x + 3).mean(), abs=1e-4)
 

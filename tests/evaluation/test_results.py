@@ -36,7 +36,9 @@ GOAL, VELOCITY, STAND = (SHIPPED.index(name) for name in ("goal", "velocity", "s
 
 @pytest.fixture
 def results(result):
-    return Results("cheetah", "reuse", "tiny", "tiny-tracker", 0.05, 1, 15, False, {}, SHIPPED, [result(), result(target=-1.0)])
+    return Results(
+        "cheetah", "reuse", "tiny", "tiny-tracker", 0.05, 1, 15, False, {}, SHIPPED, [result(), result(target=-1.0)]
+    )
 
 
 def read(path):
@@ -115,7 +117,9 @@ def episodes():
     vz = np.where(time == time[3], 2.0, np.where(time == time[20], -1.0, 0.0)).astype(np.float32) + still
     state = global_state(x=x, pitch=still + 0.3, vx=vx, vz=vz)
     belief = Belief(np.stack([x, -x], axis=-1), np.ones((*x.shape, 2), np.float32))
-    return Episodes(state, -np.abs(x - 5), belief, Subgoal(np.full(x.shape, GOAL), (x + 1)[..., None]), np.array([False, True]))
+    return Episodes(
+        state, -np.abs(x - 5), belief, Subgoal(np.full(x.shape, GOAL), (x + 1)[..., None]), np.array([False, True])
+    )
 
 
 @pytest.fixture(scope="module")
@@ -171,7 +175,10 @@ def test_returns_and_errors(judged):
 
 def test_a_pitch_is_judged_as_such(episodes):
     specs, cluster = [TaskSpec("stand", (1.0,)), TaskSpec("stand", (-0.2,))], np.zeros(episodes.reward.shape, int)
-    tasks, read = active_tasks(specs, SHIPPED, DECISIONS, 0.1), (np.full(cluster.shape, STAND), episodes.reward[..., None])
+    tasks, read = (
+        active_tasks(specs, SHIPPED, DECISIONS, 0.1),
+        (np.full(cluster.shape, STAND), episodes.reward[..., None]),
+    )
     leans = episode_results(
         SHIPPED, specs, np.arange(2), tasks, episodes, read, cluster, {"oracle": None, "idle": None}
     )
@@ -200,7 +207,14 @@ def test_each_family_has_as_many_numbers_as_it_has(episodes):
     tasks, cluster = active_tasks(specs, families, DECISIONS, 0.1), np.zeros(episodes.reward.shape, int)
     wide = replace(episodes, subgoal=Subgoal(tasks.family, tasks.target))
     one, other = episode_results(
-        families, specs, np.arange(2), tasks, wide, (tasks.family, tasks.target), cluster, {"oracle": None, "idle": None}
+        families,
+        specs,
+        np.arange(2),
+        tasks,
+        wide,
+        (tasks.family, tasks.target),
+        cluster,
+        {"oracle": None, "idle": None},
     )
     assert one.active_target == [[5.0]] * 10 + [[4.0, -0.1]] * 30
     assert one.subgoal == one.inferred_target == one.active_target

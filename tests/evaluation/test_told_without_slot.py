@@ -1,6 +1,5 @@
 """A tracker can be told only what it has a slot for; the families of modules are checked with their contracts."""
 
-import importlib
 from dataclasses import replace
 
 import pytest
@@ -10,6 +9,7 @@ from rebody.evaluation import evaluate
 from rebody.evaluation.evaluate import check_trial, take_yardsticks
 from rebody.tasks import FamilySet, line
 from rebody.tasks.task_file import Switch, TaskSpec
+from rebody.viewer.session import Session
 
 JUMP, STAND = TaskSpec("jump", (1.5,)), TaskSpec("stand", (1.0,))
 LATER = TaskSpec("goal", (2.0,), Switch(1.0, "jump", (1.5,)))
@@ -25,7 +25,6 @@ def test_an_oracle_is_refused(trial, specs, what):
 
 
 def test_on_the_live_page_too(trial):
-    Session = importlib.import_module("rebody.viewer.session").Session
     session = Session(replace(trial, agent="oracle"), TaskSpec("goal", (2.0,)))
     with pytest.raises(RebodyError, match="'oracle' is told jump"):
         session.set_task(JUMP)

@@ -20,9 +20,7 @@ from rebody.tasks import FamilySet, Quantity
 from rebody.tasks.line import GOAL, STAND, VELOCITY
 from rebody.types import Task, Transition, global_state
 
-PLAIN = FamilySet(
-    (GOAL.within(interval(-10.0, 10.0), law="plain"), VELOCITY.within(interval(-3.0, 3.0), law="plain"))
-)
+PLAIN = FamilySet((GOAL.within(interval(-10.0, 10.0), law="plain"), VELOCITY.within(interval(-3.0, 3.0), law="plain")))
 GOALS = PLAIN.only(("goal",))
 OF_GOAL, OF_VELOCITY = 0, 1
 POINTS = TARGETS[1]

@@ -100,9 +100,7 @@ def test_speeds_in_the_frame_of_the_heading(yaw, vx, vy):
     """Turning the heading and the velocity alike changes nothing."""
     along = Quantity("along", ("vx", "vy", "vz"), "m/s", "along", frame="heading")
     velocity = (vx + 1j * vy) * np.exp(1j * yaw)
-    state = global_state(
-        yaw=np.array(yaw), vx=np.array(velocity.real), vy=np.array(velocity.imag), vz=np.array(1.0)
-    )
+    state = global_state(yaw=np.array(yaw), vx=np.array(velocity.real), vy=np.array(velocity.imag), vz=np.array(1.0))
     np.testing.assert_allclose(along.read(state), [vx, vy, 1.0], atol=1e-9)
 
 
