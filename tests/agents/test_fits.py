@@ -12,10 +12,10 @@ from rebody.agents.parts import LoadedHighLevel, LoadedSlots, LoadedStepPredicto
 from rebody.agents.slots import SlotClassifier
 from rebody.control.flat import FlatView
 from rebody.control.high_level import PolicyView
+from rebody.control.places import Place
 from rebody.control.sac import Actor, SACConfig
 from rebody.control.slot_policy import SlotPolicy
 from rebody.errors import RebodyError
-from rebody.control.places import Place
 from rebody.nn import MLP
 from rebody.ranges import interval
 from rebody.tasks import FamilySet

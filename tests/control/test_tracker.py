@@ -261,8 +261,8 @@ def test_a_speed_is_paid_by_the_pace_and_not_by_every_step():
 # several numbers at once
 
 PLACE = replace(
-    line.GOAL, name="place", quantity=Quantity("xy", ("x", "y"), "m", "place"), targets=(Box((-5.0, -2.0), (5.0, 2.0)),),
-    directions=(),
+    line.GOAL, name="place", quantity=Quantity("xy", ("x", "y"), "m", "place"),
+    targets=(Box((-5.0, -2.0), (5.0, 2.0)),), directions=(),
 )  # fmt: skip
 RUN = replace(
     line.VELOCITY, name="run", quantity=Quantity("v", ("vx", "vy"), "m/s", "speed"),

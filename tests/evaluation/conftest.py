@@ -6,7 +6,6 @@ import pytest
 from rebody.evaluation.episode import EpisodeResult
 from rebody.tasks import SHIPPED
 
-
 VECTORS = ("active_target", "inferred_target", "subgoal")
 
 

@@ -10,10 +10,10 @@ from rich.console import Console
 from rebody.evaluation.diagnosis import LADDER, Diagnosis, diagnose, diagnoses_among, diagnosis_tables, shares_of
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.results import Results
+from rebody.ranges import Box
 from rebody.report.diagnosis import plot_diagnosis
 from rebody.tasks import SHIPPED, FamilySet, Quantity
 from rebody.tasks.line import GOAL
-from rebody.ranges import Box
 from rebody.tasks.task_file import TaskSpec
 
 TIME = 40
@@ -26,12 +26,13 @@ def episode_of(family="goal", target=4.0, *, read=None, subgoal=None, reached=No
     reached = subgoal if reached is None else reached
     x, v = ([reached] * TIME, [0.0] * TIME) if family == "goal" else ([0.0] * TIME, [reached] * TIME)
     return EpisodeResult(
-        families=SHIPPED, family=family, target=[target], seed=0, switch=None, time_s=(0.1 * np.arange(1, TIME + 1)).tolist(),
+        families=SHIPPED, family=family, target=[target], seed=0, switch=None,
+        time_s=(0.1 * np.arange(1, TIME + 1)).tolist(),
         quantities={"x": x, "vx": v, "pitch": [0.0] * TIME, "vz": [0.0] * TIME}, reward=[paid / TIME] * TIME,
         active_family=[family] * TIME, active_target=[[target]] * TIME, inferred_family=[guessed or family] * TIME,
         inferred_target=[[read]] * TIME, cluster=[0] * TIME, latent=[[0.0, 0.0]] * TIME,
-        subgoal_family=[slot or family] * TIME, subgoal=[[subgoal]] * TIME, fell=False, return_=paid, oracle_return=-5.0,
-        idle_return=None,         final_error=abs(reached - target), final_squared_error=0.0, ripple_m_s=0.0,
+        subgoal_family=[slot or family] * TIME, subgoal=[[subgoal]] * TIME, fell=False, return_=paid,
+        oracle_return=-5.0, idle_return=None, final_error=abs(reached - target), final_squared_error=0.0, ripple_m_s=0.0,
     )  # fmt: skip
 
 
@@ -68,8 +69,8 @@ def test_shares_are_distances_along_the_chain():
 def test_shares_of_vectors_are_lengths_of_differences():
     """A heading by the shorter way round; a read target of another family is cut, or filled up."""
     dock = replace(
-        GOAL, name="dock", quantity=Quantity("x_yaw", ("x", "yaw"), "m, rad", "dock"), targets=(Box((-5.0, -3.0), (5.0, 3.0)),),
-        directions=(),
+        GOAL, name="dock", quantity=Quantity("x_yaw", ("x", "yaw"), "m, rad", "dock"),
+        targets=(Box((-5.0, -3.0), (5.0, 3.0)),), directions=(),
     )  # fmt: skip
     episode = replace(
         episode_of(), families=FamilySet((dock, GOAL)), family="dock", target=[4.0, 3.1],

@@ -13,9 +13,9 @@ from rebody.agents.rollout import Episodes
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, save_results, summary_table
 from rebody.evaluation.results import episode_results
+from rebody.ranges import Box
 from rebody.tasks import SHIPPED, FamilySet, Quantity
 from rebody.tasks.line import GOAL as GOALS
-from rebody.ranges import Box
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 from rebody.types import Belief, Subgoal, global_state
 
@@ -131,7 +131,8 @@ def judged(episodes):
     read = (family, np.full((*family.shape, SHIPPED.size), 0.123456789, np.float32))
     cluster = np.arange(2 * DECISIONS).reshape(DECISIONS, 2) // 60
     return episode_results(
-        SHIPPED, specs, np.array([0, 3]), tasks, episodes, read, cluster, {"oracle": np.array([-7.0, -8.0]), "idle": None},
+        SHIPPED, specs, np.array([0, 3]), tasks, episodes, read, cluster,
+        {"oracle": np.array([-7.0, -8.0]), "idle": None},
     )  # fmt: skip
 
 

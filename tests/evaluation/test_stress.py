@@ -7,8 +7,8 @@ import pytest
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, load_robot
 from rebody.cli.main import run
-from rebody.control.sac import Actor, SACConfig
 from rebody.control.command import commands_within
+from rebody.control.sac import Actor, SACConfig
 from rebody.control.tracker import Tracker, command_inputs
 from rebody.evaluation import stress as module
 from rebody.evaluation.stress import Countdown, stress

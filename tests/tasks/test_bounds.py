@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.tasks.conftest import LEAN, PLACE
 
 from rebody.ranges import Box, interval
 from rebody.tasks import FamilySet
 from rebody.tasks.bounds import payable
 from rebody.tasks.line import GOAL, LINE
 from rebody.types import Task, global_state
-from tests.tasks.conftest import LEAN, PLACE
 
 ENDS = st.floats(-20, 20)
 LAWS = ("plain", "relative")

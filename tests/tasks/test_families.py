@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.tasks.conftest import DRIFT, LEAN, PLACE
 
 from rebody.errors import RebodyError
 from rebody.ranges import Box, interval
-from rebody.tasks import LAWS, SHIPPED, Direction, FamilySet, Quantity, RewardLaw
+from rebody.tasks import LAWS, SHIPPED, Direction, FamilySet, RewardLaw
 from rebody.tasks.laws import add_law, law_named
 from rebody.tasks.line import GOAL, JUMP, LINE, STAND, VELOCITY
 from rebody.types import GLOBAL_FIELDS, GlobalState, Task, global_state
-from tests.tasks.conftest import DRIFT, LEAN, PLACE
 
 
 def paid(family, target, **fields):

@@ -3,12 +3,12 @@
 import jax
 import numpy as np
 import pytest
+from tests.tasks.conftest import DRIFT, LEAN, PLACE
 
 from rebody.tasks import SHIPPED, FamilySet
 from rebody.tasks.figures import final_error, final_squared_error, ripple, settled
 from rebody.tasks.line import GOAL, JUMP, LINE, STAND, VELOCITY
 from rebody.types import GLOBAL_FIELDS, GlobalState, Task
-from tests.tasks.conftest import DRIFT, LEAN, PLACE
 
 TIMES = 0.1 * np.arange(1, 51)  # s; 5 s
 

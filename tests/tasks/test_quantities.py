@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.tasks.conftest import LEAN
 
 from rebody.tasks import SHIPPED, FamilySet, Quantity
 from rebody.tasks.line import GOAL, STAND, VELOCITY
 from rebody.types import ANGLES, GLOBAL_FIELDS, GlobalState, Task, global_state
-from tests.tasks.conftest import LEAN
 
 PITCH, X, VX = (family.quantity for family in (STAND, GOAL, VELOCITY))
 POSE = Quantity("pose", ("x", "yaw", "pitch"), "m, rad", "pose")
@@ -61,7 +61,7 @@ def test_families_of_a_set_differ_as_they_do_alone(a, b):
 def test_an_error_knows_no_turns(x, yaw, target, turns):
     families, place = FamilySet((LEAN,)), np.array(target, np.float32)
     state = global_state(x=np.float32(x)[None], yaw=np.float32(yaw)[None])
-    tasks = (Task(np.zeros(1, int), (place + [0, 2 * np.pi * n]).astype("f4")[None]) for n in (0, turns))
+    tasks = (Task(np.zeros(1, int), (place + np.array([0, 2 * np.pi * n])).astype("f4")[None]) for n in (0, turns))
     one, other = (families.error(task, state)[0] for task in tasks)
     assert one[0] == other[0]
     assert np.cos(one[1] - other[1]) == pytest.approx(1.0, abs=1e-6)

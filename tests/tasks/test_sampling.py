@@ -3,12 +3,12 @@
 import jax
 import numpy as np
 import pytest
+from tests.tasks.conftest import PLACE
 
 from rebody.ranges import Box, interval
 from rebody.tasks import FamilySet
 from rebody.tasks.family_set import draw, sample, sample_episodes
 from rebody.tasks.line import GOAL, VELOCITY
-from tests.tasks.conftest import PLACE
 
 FAMILIES = FamilySet((GOAL.within(interval(-15.0, -2.0), interval(2.0, 15.0)), VELOCITY.within(interval(1.0, 3.0))))
 OF_GOAL, OF_VELOCITY = 0, 1

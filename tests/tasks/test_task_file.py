@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from tests.tasks.conftest import PLACE
 
 from rebody.errors import RebodyError
 from rebody.tasks import SHIPPED, FamilySet
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks, parse_task, read_tasks
-from tests.tasks.conftest import PLACE
 
 GOOD = {"family": "goal", "target": -9.0}
 FAMILIES = SHIPPED.only(("goal", "velocity")).beside(FamilySet((PLACE,)))
