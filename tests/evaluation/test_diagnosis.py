@@ -32,7 +32,8 @@ def episode_of(family="goal", target=4.0, *, read=None, subgoal=None, reached=No
         active_family=[family] * TIME, active_target=[[target]] * TIME, inferred_family=[guessed or family] * TIME,
         inferred_target=[[read]] * TIME, cluster=[0] * TIME, latent=[[0.0, 0.0]] * TIME,
         subgoal_family=[slot or family] * TIME, subgoal=[[subgoal]] * TIME, fell=False, return_=paid,
-        oracle_return=-5.0, idle_return=None, final_error=abs(reached - target), final_squared_error=0.0, ripple_m_s=0.0,
+        oracle_return=-5.0, idle_return=None, final_error=abs(reached - target),
+        final_squared_error=0.0, ripple_m_s=0.0,
     )  # fmt: skip
 
 
