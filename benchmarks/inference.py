@@ -14,7 +14,8 @@ from rebody.agents.parts import load_inference
 from rebody.store import load_artifact
 from rebody.training.inference import PRESETS
 from rebody.training.inference.measure import measure_in_depth
-from rebody.training.inference.report import HELD_OUT
+
+HELD_OUT = 500
 
 
 def main() -> None:

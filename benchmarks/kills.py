@@ -24,48 +24,28 @@ import rebody.cli.train  # noqa: F401  every pipeline, before the first life: a 
 from rebody.cli.main import run
 from rebody.store import load_artifact, tree_hash
 from rebody.store.checkpoint import FILE, FOLDER
-from rebody.training.classifier import report as classifier
-from rebody.training.flat import report as flat
-from rebody.training.high_level import report as high_level
-from rebody.training.inference import measure as inference_measure
-from rebody.training.inference import report as inference
-from rebody.training.inference import train as inference_train
 from rebody.training.run import Run
-from rebody.training.scratch import report as scratch
-from rebody.training.step_predictor import report as step_predictor
-from rebody.training.tracker import report as tracker
 
 TURNS = 40
 ROBOTS = f"--robots 4 --iterations {TURNS}"
 ON_CHEETAH = f"--robot cheetah {ROBOTS}"
 SAC = "--sac.hidden 8 8 --sac.batch-size 8"
+SHORT = "--held-out 8 --held-out-s 3"
 TRAINERS = {
     "inference": f"""position --episodes 8 --decisions 24 --groups 2 --wander-iterations 2 --joint-iterations 10
         --policy-iterations {TURNS - 12} --inference-updates 2 --policy-updates 2 --inference.units 8
         --inference.window 4 --inference.batch-size 4 --inference.decoded 2 {SAC} --sac.projections 2 --prior mixture
-        --mixture.from-iteration 1 --mixture.points 60""",
-    "tracker": f"cheetah {ROBOTS} --steps 4 --updates 2 --replay 60 {SAC}",
+        --mixture.from-iteration 1 --mixture.points 60
+        --held-out 8 --held-out-at-end 8 --held-out-s 6""",
+    "tracker": f"cheetah {ROBOTS} --steps 4 --updates 2 --replay 60 {SAC} {SHORT}",
     "flat": f"""{ON_CHEETAH} --inference position --steps 4 --updates 2 --replay 60 --decisions 5 {SAC}
-        --sac.projections 0""",
+        --sac.projections 0 {SHORT}""",
     "scratch": f"""{ON_CHEETAH} --decisions 6 --groups 2 --inference-updates 2 --policy-updates 2 --inference.units 8
-        --inference.window 4 --inference.batch-size 4 --inference.decoded 2 {SAC} --sac.projections 0""",
-    "high-level": f"{ON_CHEETAH} --steps 4 --updates 2 --replay 60 --decisions 5 {SAC} --sac.projections 0",
-    "step-predictor": f"{ON_CHEETAH} --steps 20 --updates 2 --replay 60 {SAC}",
-    "classifier": f"--episodes 8 --hidden 8 --batch-size 8 --updates 2 --iterations {TURNS}",
+        --inference.window 4 --inference.batch-size 4 --inference.decoded 2 {SAC} --sac.projections 0 {SHORT}""",
+    "high-level": f"{ON_CHEETAH} --steps 4 --updates 2 --replay 60 --decisions 5 {SAC} --sac.projections 0 {SHORT}",
+    "step-predictor": f"{ON_CHEETAH} --steps 20 --updates 2 --replay 60 {SAC} {SHORT}",
+    "classifier": f"--episodes 8 --held-out 8 --hidden 8 --batch-size 8 --updates 2 --iterations {TURNS}",
 }
-SHORT = (
-    (tracker, {"COMMANDS": 4, "SECONDS": 3.0}),
-    (inference, {"HELD_OUT": 8}),
-    (inference_train, {"HELD_OUT": 8}),
-    (inference_measure, {"DECISIONS": 60}),
-    (flat, {"TASKS": 3, "DECISIONS": 30}),
-    (scratch, {"TASKS": 4, "DECISIONS": 30}),
-    (high_level, {"TASKS": 3, "DECISIONS": 30}),
-    (step_predictor, {"ROBOTS": 8, "SECONDS": 2.0}),
-    (classifier, {"HELD_OUT": 8}),
-)
-"""Where a trained part is measured, and how much of it is enough here."""
-
 TOUCHING = ("open", "os.mkdir", "os.rename", "os.remove", "os.rmdir")
 """Audit events of calls that may change a folder."""
 MOST_TOUCHES, OF_ARTIFACT = 40, 22
@@ -91,9 +71,6 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.out = arguments.out.resolve()  # files are told by where they are
     arguments.out.mkdir(parents=True)
-    for module, values in SHORT:
-        for name, value in values.items():
-            setattr(module, name, value)
     rng = np.random.default_rng(arguments.seed)
     begun, lives = time.monotonic(), {}
     for i, name in enumerate(TRAINERS):

@@ -28,14 +28,16 @@ from rebody.control.tracker import relative, tracker_observation
 from rebody.report.style import figure
 from rebody.tasks import GOAL, VELOCITY
 from rebody.tasks.figures import final_error
+from rebody.training import off_policy
 from rebody.training.tracker import tracker_preset
-from rebody.training.tracker import train as ours
-from rebody.training.tracker.report import COMMANDS, run_robots, speeds_within
+from rebody.training.tracker.report import run_robots, speeds_within
+from rebody.training.tracker.train import TrackerLearner
 from rebody.types import Subgoal, Task
 
 ENVIRONMENT = "rebody/HalfCheetahTracker-v0"
 SPEC = load_robot("cheetah")
 CONFIG = tracker_preset(SPEC)
+COMMANDS = CONFIG.held_out
 Predict = Callable[[np.ndarray], np.ndarray]
 
 
@@ -83,10 +85,11 @@ def errors(predict: Predict) -> dict[str, float]:
 def learn_ours(clock: Clock, seed: int) -> None:
     batch = RobotBatch(SPEC, CONFIG.robots)
     batch.reset(np.random.default_rng((seed, 1)))
-    state, predict = ours.initial_state(CONFIG, batch, jax.random.key(seed)), jax.jit(lambda actor, o: actor(o))
+    learner, predict = TrackerLearner(SPEC, CONFIG), jax.jit(lambda actor, o: actor(o))
+    state = off_policy.initial_state(learner, batch, jax.random.key(seed))
     going = True
     while going:
-        state, _ = ours.iterate(state, batch, CONFIG, seed)
+        state, _ = off_policy.iterate(state, learner, batch, seed)
         actor = state.sac.averaged_actor
         going = clock.tick(lambda observation, actor=actor: np.asarray(predict(actor, observation)))
 

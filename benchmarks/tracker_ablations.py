@@ -15,6 +15,7 @@ from ablations import train
 
 from rebody.agents.parts import load_tracker
 from rebody.bodies import load_robot
+from rebody.training.tracker import tracker_preset
 from rebody.training.tracker.report import measure
 
 ROBOT = "cheetah"
@@ -56,7 +57,8 @@ def figures_of(out: Path, flags: str) -> dict[str, float]:
     """Train a variant, or go on with it, and measure it."""
     train(["tracker", ROBOT, *BUDGET.split(), *flags.split()], out)
     minutes = json.loads((out / "config.json").read_text())["training"]["wall_s"] / 60
-    return {"training [min]": minutes} | measure(load_tracker(str(out)).tracker, load_robot(ROBOT))
+    spec = load_robot(ROBOT)
+    return {"training [min]": minutes} | measure(load_tracker(str(out)).tracker, spec, tracker_preset(spec))
 
 
 def show(rows: dict[str, dict[str, float]]) -> None:

@@ -5,7 +5,6 @@ Then what many tests share: tiny parts, most of them untrained, and command line
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
@@ -38,14 +37,6 @@ from rebody.inference.contract import Contract  # noqa: E402
 from rebody.inference.probe import Probe  # noqa: E402
 from rebody.store import tree_hash  # noqa: E402
 from rebody.store.typed import typed  # noqa: E402
-from rebody.training.flat import report as flat_report  # noqa: E402
-from rebody.training.high_level import report as high_level_report  # noqa: E402
-from rebody.training.inference import measure as inference_measure  # noqa: E402
-from rebody.training.inference import report as inference_report  # noqa: E402
-from rebody.training.inference import train as inference_train  # noqa: E402
-from rebody.training.scratch import report as scratch_report  # noqa: E402
-from rebody.training.step_predictor import report as step_report  # noqa: E402
-from rebody.training.tracker import report as tracker_report  # noqa: E402
 
 WINDOW, SECONDS = 6, 3.0
 JOINTS, ACTIONS = 17, 6  # of a cheetah
@@ -151,6 +142,7 @@ FLAGS = {
     "tracker": """
         train tracker cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60
         --sac.hidden 8 8 --sac.batch-size 8
+        --held-out 4 --held-out-s 3
     """,
     "inference": """
         train inference position --episodes 8 --decisions 24 --groups 2
@@ -158,23 +150,28 @@ FLAGS = {
         --inference.units 8 --inference.window 4 --inference.batch-size 4 --inference.decoded 2
         --sac.hidden 8 8 --sac.projections 2 --sac.batch-size 8
         --prior mixture --mixture.from-iteration 1 --mixture.points 60
+        --held-out 8 --held-out-at-end 8 --held-out-s 6
     """,
     "flat": """
         train flat --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5
         --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
+        --held-out 3 --held-out-s 3
     """,
     "scratch": """
         train scratch --robot cheetah --robots 4 --decisions 6 --groups 2 --iterations 9
         --inference-updates 2 --policy-updates 2 --inference.units 8 --inference.window 4 --inference.batch-size 4
         --inference.decoded 2 --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
+        --held-out 4 --held-out-s 3
     """,
     "high-level": """
         train high-level --robot cheetah --robots 4 --steps 4 --updates 2 --iterations 9 --replay 60 --decisions 5
         --sac.hidden 8 8 --sac.projections 0 --sac.batch-size 8
+        --held-out 3 --held-out-s 3
     """,
     "step-predictor": """
         train step-predictor --robot cheetah --robots 4 --steps 20 --updates 2 --iterations 9 --replay 60
         --sac.hidden 8 8 --sac.batch-size 8
+        --held-out 8 --held-out-s 2
     """,
 }
 FULL = f"""
@@ -186,38 +183,11 @@ FULL = f"""
 """Beside those of `inference`, all that a module can have: three families, a carried state, a split latent, labels."""
 
 
-@contextmanager
-def in_short() -> Iterator[pytest.MonkeyPatch]:
-    """While inside, what was trained is measured in short."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(tracker_report, "COMMANDS", 4)
-        patched.setattr(tracker_report, "SECONDS", 3.0)
-        patched.setattr(inference_report, "HELD_OUT", 8)
-        patched.setattr(inference_train, "HELD_OUT", 8)
-        patched.setattr(inference_measure, "DECISIONS", 60)
-        patched.setattr(flat_report, "TASKS", 3)
-        patched.setattr(flat_report, "DECISIONS", 30)
-        patched.setattr(scratch_report, "TASKS", 4)
-        patched.setattr(scratch_report, "DECISIONS", 30)
-        patched.setattr(high_level_report, "TASKS", 3)
-        patched.setattr(high_level_report, "DECISIONS", 30)
-        patched.setattr(step_report, "ROBOTS", 8)
-        patched.setattr(step_report, "SECONDS", 2.0)
-        yield patched
-
-
-@pytest.fixture
-def measured_in_short() -> Iterator[None]:
-    with in_short():
-        yield
-
-
 @pytest.fixture(scope="session")
 def own_module(tmp_path_factory) -> Path:
     """Folder of an inference module."""
     folder = tmp_path_factory.mktemp("trained") / "inference"
-    with in_short():
-        assert run([*FLAGS["inference"].split(), "--out", str(folder)]) == 0
+    assert run([*FLAGS["inference"].split(), "--out", str(folder)]) == 0
     return folder
 
 
@@ -225,8 +195,7 @@ def own_module(tmp_path_factory) -> Path:
 def own_tracker(own_module) -> Path:
     """Folder of a tracker."""
     folder = own_module.with_name("tracker")
-    with in_short():
-        assert run([*FLAGS["tracker"].split(), "--out", str(folder)]) == 0
+    assert run([*FLAGS["tracker"].split(), "--out", str(folder)]) == 0
     return folder
 
 
@@ -234,8 +203,7 @@ def own_tracker(own_module) -> Path:
 def full_module(tmp_path_factory) -> Path:
     """Folder of an inference module of the full toy."""
     folder = tmp_path_factory.mktemp("trained") / "full"
-    with in_short():
-        assert run([*FULL.split(), "--out", str(folder)]) == 0
+    assert run([*FULL.split(), "--out", str(folder)]) == 0
     return folder
 
 
@@ -252,7 +220,6 @@ def tiny_training(own_module, own_tracker) -> dict[str, list[str]]:
 def trained(own_module, tiny_training) -> dict[str, Path]:
     """Folders of a module, a tracker, the policies that hear that module, and that tracker's step predictor."""
     folders = {kind: own_module.with_name(kind) for kind in tiny_training}
-    with in_short():
-        for kind in ("flat", "scratch", "high-level", "step-predictor"):
-            assert run([*tiny_training[kind], "--out", str(folders[kind])]) == 0
+    for kind in ("flat", "scratch", "high-level", "step-predictor"):
+        assert run([*tiny_training[kind], "--out", str(folders[kind])]) == 0
     return folders

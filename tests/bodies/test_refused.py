@@ -129,7 +129,10 @@ FILTERED = [
 ]
 DELAYED = [('<motor name="muscle"', '<motor name="muscle" delay="0.05" nsample="5"')]
 USABLE = {"ball joint": BALL, "second free body": SECOND, "filtered actuator": FILTERED, "delayed actuator": DELAYED}
-TINY = "--robots 4 --steps 4 --updates 2 --iterations 2 --replay 60 --sac.hidden 8 8 --sac.batch-size 8"
+TINY = """
+    --robots 4 --steps 4 --updates 2 --iterations 2 --replay 60 --sac.hidden 8 8 --sac.batch-size 8
+    --held-out 4 --held-out-s 3
+"""
 
 
 @pytest.mark.parametrize("kind", USABLE)
@@ -137,7 +140,6 @@ def test_an_unusual_robot_is_ready(kind, write_own):
     assert all(finding.is_right for finding in check_robot(load_robot(write_own(mjcf=USABLE[kind]))))
 
 
-@pytest.mark.usefixtures("measured_in_short")
 def test_a_robot_that_is_all_of_this_is_trained(write_own, tmp_path):
     path = write_own(mjcf=[*BALL, *SECOND, *FILTERED])
     assert run(["train", "tracker", path, *TINY.split(), "--out", str(tmp_path / "tracker")]) == 0

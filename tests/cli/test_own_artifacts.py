@@ -216,7 +216,6 @@ def test_a_flat_policy_of_another_module_or_robot_is_refused(trained, evaluate, 
         assert results is None
 
 
-@pytest.mark.usefixtures("measured_in_short")
 def test_a_module_of_the_position_toy(tiny_training, tmp_path):
     """The thesis' first experiment, untrained; any setting of a preset can be changed."""
     untrained = ["--wander-iterations", "0", "--joint-iterations", "0", "--policy-iterations", "0"]

@@ -11,12 +11,10 @@ import safetensors.numpy
 
 from rebody.cli.main import run
 from rebody.store import load_artifact, tree_hash
-from rebody.training.flat import train as flat_train
+from rebody.training import off_policy
 from rebody.training.inference import train as inference_train
 from rebody.training.run import Run
 from rebody.training.scratch import train as scratch_train
-from rebody.training.step_predictor import train as step_train
-from rebody.training.tracker import train as tracker_train
 
 KINDS = ("tracker", "inference", "flat", "scratch", "step-predictor")
 
@@ -53,13 +51,13 @@ def checkpoint(out: Path) -> dict:
 @pytest.fixture(scope="session")
 def pipelines(tiny_training) -> dict[str, Pipeline]:
     """All of them, by name."""
-    modules = (tracker_train, inference_train, flat_train, scratch_train, step_train)
+    modules = (off_policy, inference_train, off_policy, scratch_train, off_policy)
     return {kind: Pipeline(kind, tiny_training[kind], module) for kind, module in zip(KINDS, modules, strict=True)}
 
 
 @pytest.fixture(params=KINDS)
-def pipeline(request, pipelines, measured_in_short, monkeypatch) -> Pipeline:
-    """Each of them, measured in short when it has finished."""
+def pipeline(request, pipelines, monkeypatch) -> Pipeline:
+    """Each of them."""
     monkeypatch.setattr(sys, "argv", ["rebody"])
     return pipelines[request.param]
 

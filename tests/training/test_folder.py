@@ -15,7 +15,7 @@ from rebody.training.run import Run
 
 
 @pytest.fixture
-def tracker(pipelines, measured_in_short, monkeypatch):
+def tracker(pipelines, monkeypatch):
     """A pipeline that saves a checkpoint after each turn."""
     monkeypatch.setattr(pipelines["tracker"].train, "Run", partial(Run, checkpoint_every_s=-1.0))
     return pipelines["tracker"]

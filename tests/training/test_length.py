@@ -80,7 +80,7 @@ def test_a_stopped_run_can_be_made_shorter(pipeline, stopped):
         ("inference", "--joint-iterations 3"),
     ],
 )
-def test_what_is_done_cannot_be_undone(pipelines, measured_in_short, tmp_path, name, words, capsys):
+def test_what_is_done_cannot_be_undone(pipelines, tmp_path, name, words, capsys):
     pipeline, out = pipelines[name], tmp_path / "run"
     assert pipeline(out) == 0
     before = pipeline.end(out)
@@ -97,7 +97,7 @@ def test_there_must_be_something_to_finish(pipelines, tmp_path, capsys):
     assert not (tmp_path / "run").exists()
 
 
-def test_a_checkpoint_of_an_older_release_goes_on(pipelines, measured_in_short, tmp_path, monkeypatch):
+def test_a_checkpoint_of_an_older_release_goes_on(pipelines, tmp_path, monkeypatch):
     """It says nothing of changes."""
     pipeline, out = pipelines["tracker"], tmp_path / "run"
     dumps = json.dumps

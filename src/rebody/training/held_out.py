@@ -11,7 +11,7 @@ from rebody.agents.rollout import Episodes, rollout_on_robot
 from rebody.bodies import RobotSpec
 from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
 from rebody.tasks.figures import final_error
-from rebody.types import Task
+from rebody.types import DECISION_DT, GlobalState, Task
 
 
 def act(
@@ -20,30 +20,38 @@ def act(
     spec: RobotSpec,
     tasks: TaskDistribution,
     form: RewardForm,
-    size: tuple[int, int],
+    size: int,
+    seconds: float,
     seed: int = 0,
 ) -> tuple[Task, Episodes]:
-    """Episodes of `size` (decisions, tasks), each on one task to the end; tasks are [decision, episode]."""
-    task = tasks.sample(jax.random.key(2**31 - 1 - seed), size[1:])
-    lasting = jax.tree.map(lambda leaf: np.broadcast_to(leaf, size).copy(), task)
-    return lasting, rollout_on_robot(agent, controller, spec, lasting, form, np.arange(size[1]))
+    """So many episodes, each on one task to the end; tasks are [decision, episode]."""
+    task, decisions = tasks.sample(jax.random.key(2**31 - 1 - seed), (size,)), round(seconds / DECISION_DT)
+    lasting = jax.tree.map(lambda leaf: np.repeat(np.asarray(leaf)[None], decisions, axis=0), task)
+    return lasting, rollout_on_robot(agent, controller, spec, lasting, form, np.arange(size))
+
+
+def errors_of(tasks: Task, states: GlobalState) -> dict[str, float]:
+    """Median and 95th percentile of the final error of each family [m, m/s, rad]; states are [decision, episode]."""
+    errors, figures = final_error(tasks, states), {}
+    for family in np.unique(tasks.family):
+        of_family, name = errors[tasks.family == family], FAMILIES[family].name
+        figures[f"{name} median"] = float(np.median(of_family))
+        figures[f"{name} p95"] = float(np.percentile(of_family, 95))
+    return figures
 
 
 def figures_of(tasks: Task, episodes: Episodes) -> dict[str, float]:
-    """Median and 95th percentile of the final error of each family [m, m/s, rad], return, share that fell."""
-    last = jax.tree.map(lambda leaf: leaf[-1], tasks)
-    errors, figures = final_error(last, episodes.state), {}
-    for family in np.unique(last.family):
-        of_family, name = errors[last.family == family], FAMILIES[family].name
-        figures[f"{name} median"] = float(np.median(of_family))
-        figures[f"{name} p95"] = float(np.percentile(of_family, 95))
-    figures["return"] = float(np.sum(episodes.reward, axis=0).mean())
-    return figures | {"fell": float(np.mean(episodes.fell))}
+    """Errors on the last tasks of episodes, return, share that fell."""
+    errors = errors_of(jax.tree.map(lambda leaf: leaf[-1], tasks), episodes.state)
+    return errors | {
+        "return": float(np.sum(episodes.reward, axis=0).mean()),
+        "fell": float(np.mean(episodes.fell)),
+    }
 
 
-def rows_of(figures: Mapping[str, float], condition: str) -> dict[str, str]:
-    """The same for a card; `condition` says on which tasks."""
-    rows = {}
+def rows_of(figures: Mapping[str, float], size: int, seconds: float) -> dict[str, str]:
+    """The same for a card, with what they were taken on."""
+    rows, condition = {}, f"{size} held-out tasks, {seconds:g} s"
     for name, unit in ((family.name, family.unit) for family in FAMILIES if f"{family.name} median" in figures):
         rows[f"{name} median, {condition}"] = f"{figures[f'{name} median']:.4f} {unit}"
         rows[f"{name} 95th percentile, {condition}"] = f"{figures[f'{name} p95']:.4f} {unit}"

@@ -1,13 +1,54 @@
-"""What a control step did to robots, and what that is worth to one that is told a task."""
+"""How training moves a batch of robots: the places that read and write its positions, and what a step was worth."""
+
+from collections.abc import Callable
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from rebody.bodies import RobotBatch
 from rebody.bodies.robot import Reach
-from rebody.control.tracker import Motion, TrackerReward, relative, tracker_reward
-from rebody.types import Subgoal, Task
+from rebody.control.tracker import Command, Motion, TrackerReward, relative, tracker_observation, tracker_reward
+from rebody.types import GlobalState, Subgoal, Task
+
+
+def decision(
+    batch: RobotBatch, control_step: Callable[[int], object]
+) -> tuple[GlobalState, Bool[np.ndarray, " robot"]]:
+    """Move robots by the control steps of a decision; their state after it, and which of them fell."""
+    before, fell = batch.qpos.copy(), np.zeros(batch.size, bool)
+    for step in range(batch.spec.steps_per_decision):
+        control_step(step)
+        fell |= batch.fallen
+    return batch.spec.observe(batch.qpos, before), fell
+
+
+class LastDecision(eqx.Module):
+    """Where robots were when their last decision began; written in place."""
+
+    qpos: Float[np.ndarray, "robot nq"]
+
+    @classmethod
+    def of(cls, batch: RobotBatch) -> "LastDecision":
+        """It begins now."""
+        return cls(batch.qpos.copy())
+
+    def next(self, batch: RobotBatch) -> GlobalState:
+        """The state of robots at the end of it; the next one begins."""
+        state = batch.spec.observe(batch.qpos, self.qpos)
+        self.qpos[:] = batch.qpos
+        return state
+
+    def restart(self, batch: RobotBatch, who: Bool[np.ndarray, " robot"] | slice = slice(None)) -> None:
+        """Those robots were set down where they are."""
+        self.qpos[who] = batch.qpos[who]
+
+
+def put_on_feet(batch: RobotBatch, rng: np.random.Generator) -> None:
+    """A robot that has fallen is put on its feet where it lies: episode and belief go on."""
+    fallen, x = batch.fallen, batch.x
+    batch.reset(rng, fallen)
+    batch.qpos[fallen, batch.spec.root_addresses[0]] = x[fallen]
 
 
 def motion_of(batch: RobotBatch, before: Float[np.ndarray, "robot nq"]) -> Motion:
@@ -15,11 +56,21 @@ def motion_of(batch: RobotBatch, before: Float[np.ndarray, "robot nq"]) -> Motio
     x, z, pitch = batch.spec.root_addresses
     moved = (batch.qpos - before).astype(np.float32)
     pitch_now = batch.spec.pitch(batch.qpos).astype(np.float32)
-    pace = batch.pace.astype(np.float32)
-    return Motion(moved[:, x], moved[:, pitch], pitch_now, pace, batch.fallen, moved[:, z])
+    filtered_speed = batch.pace.astype(np.float32)
+    return Motion(moved[:, x], moved[:, pitch], pitch_now, filtered_speed, batch.fallen, moved[:, z])
 
 
-def told_reward(
+def no_command(size: int) -> Command:
+    """To stay, for so many robots."""
+    return Command(np.zeros(size, np.int32), np.zeros(size, np.float32))
+
+
+def tracker_features(batch: RobotBatch, reach: Reach) -> int:
+    """Numbers that a tracker sees."""
+    return tracker_observation(batch.tracker_state(), no_command(batch.size), reach).shape[-1]
+
+
+def privileged_reward(
     batch: RobotBatch,
     before: Float[np.ndarray, "robot nq"],
     task: Task,

@@ -9,7 +9,7 @@ import io
 import json
 import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, field
 from itertools import accumulate
@@ -174,6 +174,10 @@ class Run:
         """When each part of the run ends, as far as it is done."""
         return [min(end, done) for end in accumulate(settings[name] for name in self._length)]
 
+    def training(self, config: Any) -> dict[str, Any]:
+        """What its artifact says of it: settings, seed, and seconds of training."""
+        return asdict(config) | self.length | {"seed": self.settings["seed"], "wall_s": self.wall_s}
+
     @property
     def length(self) -> dict[str, int]:
         """The settings that say how long the run is, or was to be."""
@@ -241,6 +245,15 @@ class Run:
     def _log(self, curves: Curves, metrics: Metrics, iteration: int) -> None:
         self.history.append(metrics)
         curves.add(metrics, iteration)
+
+
+def measured(
+    metrics: dict[str, Any], iteration: int, every: int, evaluate: Callable[[], Mapping[str, float]]
+) -> Metrics:
+    """Metrics of an iteration as numbers, with those of an evaluation after each `every` iterations."""
+    is_due = (iteration + 1) % every == 0
+    figures = {f"evaluation/{name}": value for name, value in evaluate().items()} if is_due else {}
+    return {name: float(value) for name, value in (metrics | figures).items()}
 
 
 def read_log(text: str) -> dict[str, Float[np.ndarray, " iteration"]]:

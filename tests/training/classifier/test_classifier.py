@@ -11,24 +11,16 @@ from rebody.bodies.toys import Randomisation
 from rebody.cli.main import run
 from rebody.store import load_artifact, tree_hash
 from rebody.tasks import GOAL, STAND, VELOCITY
-from rebody.training.classifier import ClassifierConfig, data, report
-from rebody.training.classifier.data import KNOWN_FROM, ToyWorld
+from rebody.training.classifier import ClassifierConfig
 from rebody.training.classifier.train import Beliefs, cross_entropy, initial_state, iterate
+from rebody.training.inference.episodes import ToyWorld
 from rebody.types import Belief
 
-FLAGS = "--episodes 4 --iterations 3 --updates 2 --batch-size 8 --hidden 4"
+FLAGS = "--episodes 4 --decisions 30 --held-out 6 --iterations 3 --updates 2 --batch-size 8 --hidden 4"
 
 
 @pytest.fixture(scope="module")
-def in_short():
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(report, "HELD_OUT", 6)
-        patched.setattr(data, "DECISIONS", KNOWN_FROM + 10)
-        yield
-
-
-@pytest.fixture(scope="module")
-def folder(full_module, in_short, tmp_path_factory):
+def folder(full_module, tmp_path_factory):
     out = tmp_path_factory.mktemp("slots") / "classifier"
     assert run(["train", "classifier", "--inference", str(full_module), "--out", str(out), *FLAGS.split()]) == 0
     return out
@@ -50,7 +42,7 @@ def test_what_was_trained_serves_the_module(folder, module):
     assert "wrong slots by clusters, nominal toys" in card
 
 
-def test_the_same_seed_gives_the_same_artifact(folder, full_module, in_short, tmp_path):
+def test_the_same_seed_gives_the_same_artifact(folder, full_module, tmp_path):
     out = tmp_path / "again"
     assert run(["train", "classifier", "--inference", str(full_module), "--out", str(out), *FLAGS.split()]) == 0
     assert tree_hash(load_slots(str(out)).parts) == tree_hash(load_slots(str(folder)).parts)
@@ -67,11 +59,11 @@ def test_the_world_is_the_modules_own(full_module):
     world = ToyWorld.of(load_artifact(str(full_module), "inference"))
     assert world.randomisation == Randomisation()
     assert {base_task.family for base_task in world.tasks.base_tasks} == {"goal", "velocity", "stand"}
-    tasks, disturbance = world.draw(jax.random.key(0), 50, 0.0, disturbed=True)
-    assert tasks.target.shape == (data.DECISIONS, 50)
+    tasks, disturbance = world.draw(jax.random.key(0), 50, 200, 0.0, disturbed=True)
+    assert tasks.target.shape == (200, 50)
     assert np.abs(tasks.target[tasks.family == GOAL]).min() >= 2.0
     assert float(disturbance.ripple_amplitude.max()) > 0.3
-    _, calm = world.draw(jax.random.key(0), 50, 0.0, disturbed=False)
+    _, calm = world.draw(jax.random.key(0), 50, 200, 0.0, disturbed=False)
     assert not np.asarray(calm.ripple_amplitude).any()
 
 

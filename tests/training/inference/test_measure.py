@@ -279,17 +279,16 @@ def test_clusters_of_beliefs_that_lie_about_known_points(settings, monkeypatch, 
 
 
 @pytest.fixture
-def short(monkeypatch):
-    monkeypatch.setattr(measure, "DECISIONS", 30)
+def short(config):
+    return replace(config, held_out_s=3.0)
 
 
 def assert_same(one, other):
     jax.tree.map(np.testing.assert_array_equal, (one.tasks, one.episodes), (other.tasks, other.episodes))
 
 
-@pytest.mark.usefixtures("short")
-def test_held_out_tasks_are_the_same_for_every_agent(parts, config):
-    outcomes = {kind: act(kind, parts, MassDamper(), config, 5) for kind in ("reuse", "oracle", "bayes")}
+def test_held_out_tasks_are_the_same_for_every_agent(parts, short):
+    outcomes = {kind: act(kind, parts, MassDamper(), short, 5) for kind in ("reuse", "oracle", "bayes")}
     for outcome in outcomes.values():
         assert outcome.tasks.target.shape == outcome.episodes.reward.shape == (30, 5)
         np.testing.assert_array_equal(outcome.tasks.target, outcomes["reuse"].tasks.target)
@@ -300,36 +299,32 @@ def test_held_out_tasks_are_the_same_for_every_agent(parts, config):
     np.testing.assert_array_equal(outcomes["oracle"].episodes.subgoal.value, outcomes["oracle"].tasks.target)
     found = outcomes["bayes"].episodes.belief.mean[-1, :, 1]
     np.testing.assert_allclose(found, outcomes["bayes"].tasks.target[-1], atol=0.02)
-    assert_same(act("reuse", parts, MassDamper(), config, 5), outcomes["reuse"])
+    assert_same(act("reuse", parts, MassDamper(), short, 5), outcomes["reuse"])
 
 
-@pytest.mark.usefixtures("short")
-def test_other_seeds_are_other_tasks(parts, config):
-    one, other = (act("reuse", parts, MassDamper(), config, 5, seed=seed).tasks.target for seed in (1, 2))
+def test_other_seeds_are_other_tasks(parts, short):
+    one, other = (act("reuse", parts, MassDamper(), short, 5, seed=seed).tasks.target for seed in (1, 2))
     assert not set(one[0]) & set(other[0])
 
 
-@pytest.mark.usefixtures("short")
-def test_disturbances_come_on_the_same_tasks(parts, config):
-    calm, rough = (act("reuse", parts, MassDamper(), config, 5, disturbed=flag) for flag in (False, True))
+def test_disturbances_come_on_the_same_tasks(parts, short):
+    calm, rough = (act("reuse", parts, MassDamper(), short, 5, disturbed=flag) for flag in (False, True))
     np.testing.assert_array_equal(calm.tasks.target, rough.tasks.target)
     np.testing.assert_array_equal(calm.episodes.state.x[0], calm.episodes.state.vx[0] * np.float32(0.1))
     assert np.abs(calm.episodes.state.vx - rough.episodes.state.vx).max(axis=0).min() > 0.01
 
 
-@pytest.mark.usefixtures("short")
-def test_held_out_tasks_can_change(parts, config):
-    switching = act("reuse", parts, MassDamper(), config, 20, switch_share=1.0)
+def test_held_out_tasks_can_change(parts, short):
+    switching = act("reuse", parts, MassDamper(), short, 20, switch_share=1.0)
     assert ((np.diff(switching.tasks.target, axis=0) != 0).sum(axis=0) == 1).all()
     missed = np.abs(switching.episodes.state.x - switching.tasks.target)
     np.testing.assert_allclose(switching.episodes.reward, -missed, rtol=1e-5)
 
 
-@pytest.mark.usefixtures("short")
-def test_agents_of_the_full_toy_move_it_in_every_way(config):
+def test_agents_of_the_full_toy_move_it_in_every_way(short):
     tasks = TaskDistribution((BaseTask("stand", 0.5, 1.5), BaseTask("goal", 2.0, 9.0)))
-    inference = replace(config.inference, fields=("x", "pitch"), scales=(10.0, 1.5), latent=3, kinds=1, window=None)
-    full = replace(config, tasks=tasks, inference=inference, toy="full")
+    inference = replace(short.inference, fields=("x", "pitch"), scales=(10.0, 1.5), latent=3, kinds=1, window=None)
+    full = replace(short, tasks=tasks, inference=inference, toy="full")
     fresh = trained_parts(initial_state(full, FullToy(), jax.random.key(0)), full)
     for kind in ("reuse", "oracle"):
         state = act(kind, fresh, FullToy(), full, 4).episodes.state

@@ -20,11 +20,14 @@ from rebody.training.inference.train import (
     latent_prior,
     sample_evidence,
     sample_transitions,
-    store,
-    tell,
     trained_parts,
+    with_tasks,
 )
+from rebody.training.replay import store_group
 from rebody.types import Belief, GlobalState, Task
+
+FIELDS = tuple(GlobalState.__dataclass_fields__)
+VX = FIELDS.index("vx") / 16
 
 
 def number(group, episode, time):
@@ -37,7 +40,7 @@ def labelled(config):
     """A replay whose values say where they stand."""
     group, episode, time = np.ogrid[: config.groups, : config.episodes, : config.decisions + 1]
     where = number(group, episode, time).astype(np.float32)
-    state = GlobalState(**{name: where + i / 8 for i, name in enumerate(GlobalState.__dataclass_fields__)})
+    state = GlobalState(**{name: where + FIELDS.index(name) / 16 for name in FIELDS})
     latent = np.repeat(where[..., None], config.inference.latent, axis=-1)
     return jax.tree.map(
         jnp.asarray,
@@ -73,7 +76,7 @@ def test_evidence_is_a_window_and_transitions_of_the_same_episode(labelled, conf
     assert set(time[:, 0]) == set(range(config.decisions - length + 1))
     np.testing.assert_array_equal(window.reward, -window.previous.x)
     np.testing.assert_array_equal(window.state.x, window.previous.x + 1)
-    np.testing.assert_array_equal(window.state.vx, window.previous.x + 1 + 6 / 8)  # the seventh field
+    np.testing.assert_array_equal(window.state.vx, window.previous.x + 1 + VX)
 
     of_group, of_episode, at = unpack(evidence.previous.x)
     decoded = np.zeros(config.inference.decoded, int)
@@ -102,7 +105,7 @@ def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, con
     assert set(group) == set(range(stored))
     assert set(episode) == set(range(config.episodes // 2))
     assert set(time) == set(range(config.decisions))
-    np.testing.assert_array_equal(vx, x + 6 / 8)
+    np.testing.assert_array_equal(vx, x + VX)
     for mean in belief[: config.inference.latent]:
         np.testing.assert_array_equal(mean, x + 0.5)
     for deviation in belief[config.inference.latent :]:
@@ -116,7 +119,7 @@ def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, con
 
 def test_the_oracle_is_told_the_task_that_is_on_at_every_decision(labelled, config):
     """In this replay, another one at every decision; the last one lasts."""
-    told = tell(labelled, task_code(config.target_ranges))
+    told = with_tasks(labelled, task_code(config.target_ranges))
     target = np.asarray(labelled.task.target) / 10.0
     assert told.belief.mean.shape == (*labelled.state.x.shape, 2)
     np.testing.assert_array_equal(told.belief.mean[..., 0], np.ones(labelled.state.x.shape))
@@ -197,13 +200,13 @@ def test_a_mixture_is_kept_where_there_is_one(state, config):
 
 def test_what_is_kept_are_the_averaged_policies(state, config):
     marked = eqx.tree_at(
-        lambda s: (s.sac.averaged_actor.net.mlp.biases[-1], s.told.averaged_actor.net.mlp.biases[-1]),
+        lambda s: (s.sac.averaged_actor.net.mlp.biases[-1], s.privileged.averaged_actor.net.mlp.biases[-1]),
         state,
         (jnp.full(2, 1.0), jnp.full(2, 2.0)),
     )
     parts = trained_parts(marked, config)
     assert tree_hash(parts.high_level.actor) == tree_hash(marked.sac.averaged_actor)
-    assert tree_hash(parts.told_policy.actor) == tree_hash(marked.told.averaged_actor)
+    assert tree_hash(parts.told_policy.actor) == tree_hash(marked.privileged.averaged_actor)
     assert tree_hash(parts.module) == tree_hash(state.module)
 
 
@@ -227,13 +230,12 @@ def test_the_newest_episodes_replace_the_oldest(labelled, config):
     replay = jax.tree.map(jnp.zeros_like, labelled)
     for iteration in range(5):
         new = jax.tree.map(lambda leaf, i=iteration: jnp.full_like(leaf[0], i + 1), labelled)
-        replay, stored = store(replay, new, jnp.asarray(iteration))
+        replay, stored = store_group(replay, new, jnp.asarray(iteration))
         assert int(stored) == min(iteration + 1, 3)
     for leaf in jax.tree.leaves(replay):
         np.testing.assert_array_equal(leaf.reshape(3, -1).T - np.array([4, 5, 3]), 0)
 
 
-@pytest.mark.usefixtures("measured_in_short")
 def test_inference_is_frozen_while_the_policy_learns_on(pipelines, tmp_path, monkeypatch):
     """One turn of wandering: inference alone. Two with all, the told policy among them. Then the policy alone."""
     states, iterate = [], train.iterate
@@ -247,6 +249,6 @@ def test_inference_is_frozen_while_the_policy_learns_on(pipelines, tmp_path, mon
     assert changed(lambda state: state.module.encoder) == [True, True, True, False, False]
     assert changed(lambda state: state.module.decoder.experts) == [True, True, True, False, False]
     assert changed(lambda state: state.sac.actor) == [False, True, True, True, True]
-    assert changed(lambda state: state.told.actor) == [False, True, True, False, False]
+    assert changed(lambda state: state.privileged.actor) == [False, True, True, False, False]
     assert changed(lambda state: state.clusters) == [False, True, True, False, False]
     assert changed(lambda state: state.replay.reward) == 5 * [True]

@@ -14,10 +14,10 @@ from rebody.control.sac import SACConfig
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
 from rebody.tasks import GOAL, reward
-from rebody.training.inference.train import tell
-from rebody.training.minds import Minds
+from rebody.training.inference.train import with_tasks
 from rebody.training.scratch import ScratchConfig
-from rebody.training.scratch.train import collect, initial_state, sample_steps, understand
+from rebody.training.scratch.train import collect, initial_state, interpret, sample_steps
+from rebody.training.task_inference import begin_inference
 from rebody.types import Task, Transition, global_state
 
 ROBOTS, DECISIONS, GROUPS, START = 3, 5, 2, 15.0
@@ -39,14 +39,14 @@ def meta(config, cheetah):
 
 
 @pytest.fixture(scope="module")
-def state(config, meta, cheetah):
-    return initial_state(config, meta, RobotBatch(cheetah, ROBOTS), jax.random.key(0))
+def state(config, cheetah):
+    return initial_state(config, RobotBatch(cheetah, ROBOTS), jax.random.key(0))
 
 
 @pytest.fixture(scope="module")
-def group(config, meta, state, cheetah):
+def group(config, state, cheetah):
     batch = RobotBatch(cheetah, ROBOTS)
-    return collect(state.module, state.sac.actor, batch, config, meta, np.random.default_rng(0), jax.random.key(0))
+    return collect(state, batch, config, np.random.default_rng(0), jax.random.key(0))
 
 
 def test_tasks_are_within_reach_and_starts_anywhere(group, meta):
@@ -84,11 +84,11 @@ def test_the_module_hears_the_tasks_own_reward_and_the_beliefs_are_its_own(group
     np.testing.assert_array_equal(episodes.belief.mean[:, 0], 0.0)
 
 
-def test_going_to_a_goal_is_paid_by_how_well_its_speed_is_held(config, meta, state, cheetah):
+def test_going_to_a_goal_is_paid_by_how_well_its_speed_is_held(config, state, cheetah):
     """Wanted is 1.5 times what is left a second, at most 3 m/s."""
     still = replace(config, switch_share=0.0)
     batch = RobotBatch(cheetah, ROBOTS)
-    group = collect(state.module, state.sac.actor, batch, still, meta, np.random.default_rng(0), jax.random.key(3))
+    group = collect(state, batch, still, np.random.default_rng(0), jax.random.key(3))
     steps, is_goal = group.steps, group.episodes.task.family[:, 0] == GOAL
     assert is_goal.any()
     left = (group.episodes.task.target[:, 0] - steps.next_x)[:, is_goal]
@@ -116,7 +116,7 @@ def test_a_control_step_is_learned_from_with_the_belief_of_its_decision_or_the_t
     """Whose sample is which shows by x, which no two control steps share."""
     replay = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), group)
     believed = state.module.decoder.interpret(replay.episodes.belief)
-    told = tell(replay.episodes, told_code(PLACES)).belief
+    told = with_tasks(replay.episodes, told_code(PLACES)).belief
     batch = sample_steps(replay, believed, told, 2, config, jax.random.key(1))
     steps, times_told = group.steps, 0
     for row in range(100):
@@ -133,13 +133,11 @@ def test_who_is_told_goes_by_the_truth_in_the_terms_of_a_belief(config, state):
     """A goal at -5 m: meant is x, half of its scale to the back, no doubt."""
     four = replace(config, robots=4)
     task = Task(np.full(4, GOAL, np.int32), np.full(4, -5.0, np.float32))
-    encoder = state.module.encoder
-    here = global_state(x=np.zeros(4, np.float32))
-    minds = Minds(encoder.initial((4,)), encoder.prior((4,)), here, task)
-    gone_by = understand(state.module, minds, four)
+    known = begin_inference(state.module.encoder, global_state(x=np.zeros(4, np.float32)), task)
+    gone_by = interpret(state.module, known, four)
     np.testing.assert_allclose(gone_by.mean[:2], [[1.0, 0.0, -0.5, 0.0]] * 2)
     assert not np.asarray(gone_by.variance[:2]).any()
-    believed = state.module.decoder.interpret(minds.belief)
+    believed = state.module.decoder.interpret(known.belief)
     np.testing.assert_allclose(gone_by.mean[2:], believed.mean[2:])
     np.testing.assert_allclose(gone_by.variance[2:], believed.variance[2:])
 

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from rebody.agents.parts import LoadedTracker
 from rebody.bodies import RobotBatch
 from rebody.control import sac
 from rebody.control.sac import SACBatch, SACConfig
@@ -13,19 +14,18 @@ from rebody.control.step_predictor import steps_of
 from rebody.control.tracker import relative, tracker_observation
 from rebody.store import tree_hash
 from rebody.tasks import GOAL, VELOCITY
-from rebody.training.ring import draw
+from rebody.training.off_policy import initial_state, learn
+from rebody.training.replay import Replay
 from rebody.training.step_predictor import StepPredictorConfig
-from rebody.training.step_predictor.chase import advance, begin
-from rebody.training.step_predictor.choosers import Chooser, Fixed
-from rebody.training.step_predictor.train import collect, initial_state
-from rebody.training.transitions import learn
+from rebody.training.step_predictor.chase import Fixed, advance, begin
+from rebody.training.step_predictor.train import StepPredictorLearner
 
 ROBOTS, JOINTS = 5, 17
 STEPS = (1, 2, 3, 7, 20)
 """How long each robot holds its subgoals."""
 
 
-class Own(Chooser):
+class Own(eqx.Module):
     """Each robot has its own number."""
 
     def __call__(self, observation, key):
@@ -124,16 +124,17 @@ def test_tasks_change_only_when_a_subgoal_has_ended(walk):
         before = task
 
 
-def test_the_ring_holds_every_subgoal_and_nothing_frozen_changes(batch, tracker, config):
+def test_the_buffer_holds_every_subgoal_and_nothing_frozen_changes(batch, tracker, config):
     frozen = tree_hash(tracker)
-    state = initial_state(config, batch, tracker, jax.random.key(0))
+    learner = StepPredictorLearner(batch.spec, config, LoadedTracker("tiny", "cheetah", tracker))
+    state = initial_state(learner, batch, jax.random.key(0))
     for i in range(3):
-        before = int(state.written)
-        collect(state, batch, tracker, config, np.random.default_rng(i), jax.random.key(i))
-        assert int(state.written) - before >= ROBOTS  # no subgoal lasts longer than a turn
-    rows = min(int(state.written), config.replay)
-    assert (state.replay.reward[:rows] < 0).all()
-    assert not state.replay.reward[rows:].any()
+        before = int(state.replay.written)
+        learner.collect(state, batch, np.random.default_rng(i), jax.random.key(i))
+        assert int(state.replay.written) - before >= ROBOTS  # no subgoal lasts longer than a turn
+    rows = min(int(state.replay.written), config.replay)
+    assert (state.replay.rows.reward[:rows] < 0).all()
+    assert not state.replay.rows.reward[rows:].any()
     assert tree_hash(tracker) == frozen
 
 
@@ -145,7 +146,7 @@ def test_it_learns_what_pays():
     action = rng.uniform(-1, 1, (1000, 1)).astype(np.float32)
     reward = -0.1 * np.abs(np.asarray(steps_of(action)) - np.where(seen[:, 0] == 1, 10, 1)).astype(np.float32)
     ended = SACBatch(seen, action, reward, seen, np.ones(1000, np.float32))
-    batches = draw(ended, 1000, (config.updates, config.sac.batch_size), rng)
+    batches = Replay(ended, np.asarray(1000)).draw((config.updates, config.sac.batch_size), rng)
     policy = sac.initial_state(1, 1, config.sac, jax.random.key(0))
     policy, _ = learn(policy, batches, jax.random.key(1), config.sac)
     wanted = steps_of(eqx.filter_jit(policy.actor)(np.array([[0.0], [1.0]], np.float32)))

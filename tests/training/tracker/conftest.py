@@ -9,7 +9,7 @@ from rebody.control.sac import SACConfig
 from rebody.training.tracker import TrackerConfig
 
 REACH = Reach(speed=(-3.0, 3.0))
-ROBOTS, STEPS, ROWS = 3, 4, 29  # a ring that is no multiple of the twelve rows of a turn
+ROBOTS, STEPS, ROWS = 3, 4, 29  # a buffer that is no multiple of the twelve rows of a turn
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from rebody.bodies import load_robot
 from rebody.bodies.robot import Reach
 from rebody.control.sac import Actor, SACConfig
 from rebody.control.tracker import Tracker
-from rebody.training.tracker import report
+from rebody.training.tracker import TrackerConfig
 from rebody.training.tracker.report import measure, speeds_within
 
 
@@ -28,11 +28,10 @@ def test_no_speed_beyond_the_reach_is_held_out(ends):
     assert ((speeds >= ends[0]) & (speeds <= ends[1])).all()
 
 
-def test_a_tracker_that_does_nothing_misses_by_what_was_asked(monkeypatch):
-    monkeypatch.setattr(report, "SECONDS", 3.0)
+def test_a_tracker_that_does_nothing_misses_by_what_was_asked():
     cheetah, reach = load_robot("cheetah"), Reach(speed=(-3.0, 3.0), pitch=(-1.0, 1.0))
     still = jax.tree.map(lambda leaf: 0 * leaf, Actor(17 + 10, 6, SACConfig(hidden=(4,)), jax.random.key(0)))
-    figures = measure(Tracker(still, reach), cheetah)
+    figures = measure(Tracker(still, reach), cheetah, TrackerConfig(reach=reach, held_out_s=3.0))
     assert figures.keys() == {
         "goal median", "goal p95", "velocity median", "velocity p95", "stand median", "stand p95", "zero speed", "fell",
     }  # fmt: skip

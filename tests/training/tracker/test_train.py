@@ -9,9 +9,10 @@ import pytest
 from rebody.control.tracker import MARGIN, Command, Motion
 from rebody.errors import RebodyError
 from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.training.off_policy import initial_state
 from rebody.training.tracker import train, train_tracker
 from rebody.training.tracker.commands import CommandDistribution
-from rebody.training.tracker.train import Replay, collect, initial_state, relabel
+from rebody.training.tracker.train import ControlSteps, Relabelling, TrackerLearner
 
 CONTROL_DT = 0.05
 TURNS = 4
@@ -40,64 +41,64 @@ def test_the_only_slot_is_one_of_the_robots(tmp_path, config):
 
 
 def turn(state, batch, config, i):
-    collect(state, batch, config, np.random.default_rng(i), jax.random.key(i))
+    TrackerLearner(batch.spec, config).collect(state, batch, np.random.default_rng(i), jax.random.key(i))
     state.iteration[...] += 1
 
 
-def test_the_ring_holds_the_last_transitions(batch, config, counted):
-    state = initial_state(config, batch, jax.random.key(0))
+def test_the_buffer_holds_the_last_transitions(batch, config, counted):
+    state = initial_state(TrackerLearner(batch.spec, config), batch, jax.random.key(0))
     for i in range(TURNS):
         turn(state, batch, config, i)
         seen = (i + 1) * config.steps * config.robots
         held = np.arange(config.replay)
         newest = np.where(held < seen, held + (seen - 1 - held) // config.replay * config.replay, 0)
-        np.testing.assert_allclose(state.replay.action[:, 0], newest / 1000, atol=1e-6)
+        np.testing.assert_allclose(state.replay.rows.action[:, 0], newest / 1000, atol=1e-6)
     assert seen > config.replay  # it has come round
 
 
-def test_rows_of_the_ring_belong_together(batch, config, counted):
-    """Where a step leaves a robot, its next one begins, also across the end of the ring."""
-    state = initial_state(config, batch, jax.random.key(0))
+def test_rows_of_the_buffer_belong_together(batch, config, counted):
+    """Where a step leaves a robot, its next one begins, also across the end of the buffer."""
+    state = initial_state(TrackerLearner(batch.spec, config), batch, jax.random.key(0))
     x, moved = batch.x, np.zeros(config.robots)
     for i in range(TURNS):
         turn(state, batch, config, i)
-    ring, seen = state.replay, TURNS * config.steps * config.robots
+    buffer, seen = state.replay.rows, TURNS * config.steps * config.robots
     for number in range(seen - config.replay, seen - config.robots):
         here, after = number % config.replay, (number + config.robots) % config.replay
-        np.testing.assert_array_equal(ring.next_joints[here], ring.joints[after])
-        if ring.command.slot[here] == ring.command.slot[after] == GOAL and not state.orders.guided.any():
+        np.testing.assert_array_equal(buffer.next_joints[here], buffer.joints[after])
+        if buffer.command.slot[here] == buffer.command.slot[after] == GOAL and not state.world.orders.guided.any():
             np.testing.assert_allclose(
-                ring.command.value[here] - ring.motion.displacement[here], ring.command.value[after], atol=1e-5
+                buffer.command.value[here] - buffer.motion.displacement[here], buffer.command.value[after], atol=1e-5
             )
     last = (seen - config.robots + np.arange(config.robots)) % config.replay
-    np.testing.assert_array_equal(ring.next_joints[last], batch.tracker_state())
-    np.testing.assert_allclose(ring.motion.pitch[last], batch.spec.pitch(batch.qpos), rtol=1e-6)
+    np.testing.assert_array_equal(buffer.next_joints[last], batch.tracker_state())
+    np.testing.assert_allclose(buffer.motion.pitch[last], batch.spec.pitch(batch.qpos), rtol=1e-6)
     for number in range(seen - config.replay, seen):
-        moved[number % config.robots] += ring.motion.displacement[number % config.replay]
+        moved[number % config.robots] += buffer.motion.displacement[number % config.replay]
     assert np.abs(batch.x - x).max() > 0
     assert (np.abs(moved) <= np.abs(batch.x - x) + 0.1).all()
 
 
 def test_a_goal_comes_nearer_by_what_the_robot_moved(batch, config, counted):
     config = replace(config, guided_share=0.0)
-    state = initial_state(config, batch, jax.random.key(0))
+    state = initial_state(TrackerLearner(batch.spec, config), batch, jax.random.key(0))
     turn(state, batch, config, 0)
-    ring = jax.tree.map(lambda rows: rows[: config.steps * config.robots], state.replay)
-    ring = jax.tree.map(lambda rows: rows.reshape(config.steps, config.robots, *rows.shape[1:]), ring)
-    nearer = np.where(ring.command.slot == GOAL, ring.motion.displacement, 0.0)
-    np.testing.assert_allclose(ring.command.value[1:], (ring.command.value - nearer)[:-1], atol=1e-5)
+    buffer = jax.tree.map(lambda rows: rows[: config.steps * config.robots], state.replay.rows)
+    buffer = jax.tree.map(lambda rows: rows.reshape(config.steps, config.robots, *rows.shape[1:]), buffer)
+    nearer = np.where(buffer.command.slot == GOAL, buffer.motion.displacement, 0.0)
+    np.testing.assert_allclose(buffer.command.value[1:], (buffer.command.value - nearer)[:-1], atol=1e-5)
 
 
 def test_what_has_fallen_starts_anew_with_a_new_order(batch, config):
-    state = initial_state(config, batch, jax.random.key(0))
+    state = initial_state(TrackerLearner(batch.spec, config), batch, jax.random.key(0))
     turn(state, batch, config, 0)
     batch.lying_s[:] = (0.0, 5.0, 0.0)
-    before, left = batch.qpos.copy(), state.orders.steps_left.copy()
-    train.begin_anew(state, batch, batch.fallen, np.random.default_rng(0))
+    before, left = batch.qpos.copy(), state.world.orders.steps_left.copy()
+    train.begin_anew(state.world, batch, batch.fallen, np.random.default_rng(0))
     np.testing.assert_array_equal((batch.qpos != before).any(axis=1), [False, True, False])
     assert batch.x[1] == 0
-    np.testing.assert_array_equal(state.previous_qpos[1], batch.qpos[1])
-    np.testing.assert_array_equal(state.orders.steps_left, [left[0], 0, left[2]])
+    np.testing.assert_array_equal(state.world.last.qpos[1], batch.qpos[1])
+    np.testing.assert_array_equal(state.world.orders.steps_left, [left[0], 0, left[2]])
     assert batch.lying_s[1] == 0
 
 
@@ -105,7 +106,7 @@ def test_what_has_fallen_starts_anew_with_a_new_order(batch, config):
 def relabelled(config):
     """(transitions, what is learned from them), most of them short of every limit."""
     rng, size = np.random.default_rng(1), 400
-    transitions = Replay(
+    transitions = ControlSteps(
         joints=rng.normal(size=(size, 17)).astype(np.float32),
         action=rng.uniform(-1, 1, (size, 6)).astype(np.float32),
         next_joints=rng.normal(size=(size, 17)).astype(np.float32),
@@ -121,7 +122,7 @@ def relabelled(config):
             rng.integers(GOAL, VELOCITY + 1, size).astype(np.int32), rng.uniform(-3, 3, size).astype(np.float32)
         ),
     )
-    return transitions, relabel(transitions, jax.random.key(2), config, CONTROL_DT)
+    return transitions, Relabelling(config, CONTROL_DT)(transitions, jax.random.key(2))
 
 
 def told(observation, config):
@@ -172,7 +173,7 @@ def test_afterwards_a_goal_is_nearer_and_a_speed_the_same(relabelled, config):
 
 def test_relabelling_can_be_turned_off(relabelled, config):
     transitions, _ = relabelled
-    batch = relabel(transitions, jax.random.key(2), replace(config, relabelled=0.0), CONTROL_DT)
+    batch = Relabelling(replace(config, relabelled=0.0), CONTROL_DT)(transitions, jax.random.key(2))
     is_goal, value = told(batch.observation, config)
     np.testing.assert_array_equal(is_goal, transitions.command.slot == GOAL)
     np.testing.assert_allclose(value, transitions.command.value, rtol=1e-5)
@@ -180,16 +181,16 @@ def test_relabelling_can_be_turned_off(relabelled, config):
 
 def test_a_fall_ends_what_is_learned_and_nothing_else_does(batch, config, counted):
     """Robot 1 has lain on its back for almost long enough."""
-    state = initial_state(config, batch, jax.random.key(0))
+    state = initial_state(TrackerLearner(batch.spec, config), batch, jax.random.key(0))
     batch.qpos[1, batch.spec.root_addresses[2]] = np.pi
     batch.lying_s[1] = 0.98
     turn(state, batch, config, 0)
     rows = config.steps * config.robots
-    seen = jax.tree.map(lambda leaf: leaf[:rows], state.replay)
+    seen = jax.tree.map(lambda leaf: leaf[:rows], state.replay.rows)
     assert np.flatnonzero(seen.motion.fell).tolist() == [1]
     assert np.abs(seen.next_joints[1, 1]) > 2.5  # its pitch: what is learned is how it lay
     assert np.abs(seen.joints[1 + config.robots, 1]) < 0.2  # and then it stood again
-    learned = relabel(seen, jax.random.key(0), config, CONTROL_DT)
+    learned = Relabelling(config, CONTROL_DT)(seen, jax.random.key(0))
     assert np.flatnonzero(learned.terminal).tolist() == [1]
 
 
@@ -208,10 +209,10 @@ def test_pushes_come_as_often_and_are_as_large_as_the_settings_say(batch, config
 
 def test_a_push_is_seen_before_the_robot_acts(batch, config, counted):
     """It is no work of the action's: the speed changes between two steps, not within one."""
-    state = initial_state(config, batch, jax.random.key(0))
+    state = initial_state(TrackerLearner(batch.spec, config), batch, jax.random.key(0))
     turn(state, batch, replace(config, push=0.4, push_every_s=CONTROL_DT), 0)
-    ring, speed = state.replay, 8  # after z, pitch and six joints
-    change = ring.joints[3:12] - ring.next_joints[:9]
+    buffer, speed = state.replay.rows, 8  # after z, pitch and six joints
+    change = buffer.joints[3:12] - buffer.next_joints[:9]
     assert (np.abs(change[:, speed]) > 1e-4).all()
     assert np.abs(change[:, speed]).max() < 0.4 + 1e-5
     np.testing.assert_array_equal(np.delete(change, speed, axis=1), 0)
@@ -220,7 +221,7 @@ def test_a_push_is_seen_before_the_robot_acts(batch, config, counted):
 def test_under_a_new_command_a_wanted_pitch_stays_in_the_world(relabelled, config):
     transitions, _ = relabelled
     standing = replace(config, relabelled=1.0, reach=replace(config.reach, pitch=(-0.5, 1.0)))
-    batch = relabel(transitions, jax.random.key(2), standing, CONTROL_DT)
+    batch = Relabelling(standing, CONTROL_DT)(transitions, jax.random.key(2))
     stands, turn, later = (np.asarray(o) for o in (batch.observation[:, 19] == 1, *pitches(batch)))
     assert np.mean(stands) == pytest.approx(1 / 3, abs=0.1)
     assert not turn[~stands].any()
@@ -243,7 +244,7 @@ def test_its_own_command_to_stand_is_kept(relabelled, config):
     transitions, _ = relabelled
     told = replace(transitions.command, slot=np.full(400, STAND, np.int32))
     standing = replace(config, relabelled=0.0, reach=replace(config.reach, pitch=(-0.5, 1.0)))
-    batch = relabel(replace(transitions, command=told), jax.random.key(2), standing, CONTROL_DT)
+    batch = Relabelling(standing, CONTROL_DT)(replace(transitions, command=told), jax.random.key(2))
     turn, later = pitches(batch)
     np.testing.assert_array_equal(turn, told.value)
     np.testing.assert_allclose(later, told.value - transitions.motion.turn, atol=1e-6)

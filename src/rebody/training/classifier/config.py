@@ -1,8 +1,11 @@
 """Settings of a slot classifier's training run."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from rebody.ranges import Copies, Count, Layers, Number, Rate, Share
+from msgspec import Meta
+
+from rebody.ranges import Copies, Count, Episodes, Layers, Number, Rate, Share
 
 
 @dataclass(frozen=True)
@@ -10,7 +13,11 @@ class ClassifierConfig:
     """One training run; everything happens on the toy."""
 
     episodes: Copies = 512
-    """Episodes of 20 s that the module's own policy acts in, half of them disturbed as in its training."""
+    """Episodes that the module's own policy acts in, half of them disturbed as in its training."""
+    decisions: Annotated[int, Meta(ge=21, le=36_000)] = 200
+    """Length of an episode, in training and measurement: longer than it takes to know something."""
+    held_out: Episodes = 200
+    """Held-out episodes of a measurement."""
     switch_share: Share = 0.5
     """Share of episodes in which the task changes once, at any decision."""
     hidden: Layers = (32,)

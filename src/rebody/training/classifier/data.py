@@ -1,52 +1,27 @@
 """Beliefs on the toy: what the classifier learns from, and what the slots of clusters are found on."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int, PRNGKeyArray
+from jaxtyping import Float, Int
 
 from rebody.agents.agent import Command, ReuseAgent
 from rebody.agents.build import build_agent
-from rebody.agents.configs import understood
 from rebody.agents.parts import Inference
 from rebody.agents.rollout import Episodes, rollout_on_toy
 from rebody.agents.slots import OneSlot
-from rebody.bodies.toys import Disturbance, Randomisation, no_disturbance
+from rebody.bodies.toys import Disturbance
 from rebody.inference.mixture.padded import MixturePrior
-from rebody.store import Artifact
-from rebody.tasks import TaskDistribution, achieved_by_way_of
+from rebody.tasks import achieved_by_way_of
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
-DECISIONS = 200
 KNOWN_FROM = 20
 """Decisions after which a belief counts in judging slots: before them little is known."""
 HOLD = 5
 """Decisions for which the toy's tracker thinks of holding an action."""
-
-
-@dataclass(frozen=True)
-class ToyWorld:
-    """The tasks and disturbances that a module was trained on, out of its artifact."""
-
-    tasks: TaskDistribution
-    randomisation: Randomisation
-
-    @classmethod
-    def of(cls, module: Artifact) -> "ToyWorld":
-        """From the artifact's training settings; RebodyError where they do not tell."""
-        training = module.config["training"]
-        said = {name: training[name] for name in ("tasks", "randomisation") if name in training}
-        return understood(said, cls, module.name)
-
-    def draw(self, key: PRNGKeyArray, episodes: int, switch_share: float, *, disturbed: bool):
-        """Active tasks [time, episode], and how each episode's toy departs from the nominal one."""
-        task_key, disturbance_key = jax.random.split(key)
-        tasks = self.tasks.sample_episodes(task_key, episodes, DECISIONS, switch_share)
-        rough = self.randomisation.sample(disturbance_key, (episodes,))
-        return jax.tree.map(lambda leaf: leaf.T, tasks), rough if disturbed else no_disturbance((episodes,))
 
 
 def act(module: Inference, tasks: Task, disturbance: Disturbance) -> Episodes:

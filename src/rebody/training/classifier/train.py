@@ -10,16 +10,20 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
-from rebody.agents.parts import Inference, load_inference
-from rebody.agents.slots import SlotClassifier
+from rebody.agents.configs import ClassifierSettings
+from rebody.agents.parts import Inference, SlotParts, load_inference
+from rebody.agents.slots import SlotChooser, SlotClassifier, SlotOfCluster
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
 from rebody.nn import MLP
 from rebody.ranges import check_ranges
-from rebody.store import load_artifact
+from rebody.store import load_artifact, tree_hash
+from rebody.tasks import family_names
+from rebody.training.card import save
 from rebody.training.classifier.config import ClassifierConfig
-from rebody.training.classifier.data import ToyWorld, act
-from rebody.training.classifier.report import save_slots
+from rebody.training.classifier.data import KNOWN_FROM, act, slots_of_clusters
+from rebody.training.descent import descend
+from rebody.training.inference.episodes import ToyWorld
 from rebody.training.run import Metrics, Run
 from rebody.types import AnyArray, Belief
 
@@ -56,7 +60,7 @@ def train_classifier(
         seen = listen(module, world, config, jax.random.fold_in(key, 2**31 - 1))
         state = run.restore(initial_state(module, config, key))
         state = run.loop(state, lambda state: iterate(state, seen, config, key), config.iterations, "classifier")
-        return save_slots(state.classifier, module, world, config, run, seed)
+        return save_slots(state.classifier, module, world, config, run)
 
 
 def iterate(state: RunState, seen: Beliefs, config: ClassifierConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
@@ -70,7 +74,7 @@ def listen(module: Inference, world: ToyWorld, config: ClassifierConfig, key: PR
     parts = []
     for i, disturbed in enumerate((False, True)):
         tasks, disturbance = world.draw(
-            jax.random.fold_in(key, i), config.episodes // 2, config.switch_share, disturbed=disturbed
+            jax.random.fold_in(key, i), config.episodes // 2, config.decisions, config.switch_share, disturbed=disturbed
         )
         parts.append((act(module, tasks, disturbance).belief, tasks.family))
     belief, family = jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=1), *parts)
@@ -90,25 +94,69 @@ def learn(
     state: RunState, seen: Beliefs, config: ClassifierConfig, key: PRNGKeyArray
 ) -> tuple[RunState, Float[Array, ""]]:
     """Updates on beliefs drawn from all; returns the mean loss."""
-    arrays, static = eqx.partition(state.classifier, eqx.is_array)
 
-    def step(carry, key):
-        arrays, optimiser = carry
+    def loss(classifier: SlotClassifier, key: PRNGKeyArray):
         chosen = jax.random.randint(key, (config.batch_size,), 0, len(seen.family))
-        some = jax.tree.map(lambda leaf: leaf[chosen], seen)
-        value, gradient = jax.value_and_grad(lambda a: cross_entropy(eqx.combine(a, static), some))(arrays)
-        updates, optimiser = _optimiser(config).update(gradient, optimiser)
-        return (eqx.apply_updates(arrays, updates), optimiser), value
+        value = cross_entropy(classifier, jax.tree.map(lambda leaf: leaf[chosen], seen))
+        return value, {"cross_entropy": value}
 
     keys = jax.random.split(key, config.updates)
-    (arrays, optimiser), values = jax.lax.scan(step, (arrays, state.optimiser), keys)
-    return RunState(eqx.combine(arrays, static), optimiser, state.iteration + 1), values.mean()
+    classifier, optimiser, metrics = descend(state.classifier, state.optimiser, _optimiser(config), loss, keys)
+    return RunState(classifier, optimiser, state.iteration + 1), metrics["cross_entropy"]
 
 
 def cross_entropy(classifier: SlotClassifier, seen: Beliefs) -> Float[Array, ""]:
     """Binary, per slot."""
     wanted = seen.family[:, None] == np.asarray(classifier.families)
     return optax.sigmoid_binary_cross_entropy(classifier.logits(seen.belief), wanted.astype(jnp.float32)).mean()
+
+
+def save_slots(
+    classifier: SlotClassifier, module: Inference, world: ToyWorld, config: ClassifierConfig, run: Run
+) -> Path:
+    """Find the slots of clusters, measure both, write artifact and card."""
+    slots = np.zeros(0, np.int32)
+    choosers: dict[str, SlotChooser] = {"classifier": classifier}
+    if module.parts.mixture is not None:
+        key = jax.random.fold_in(jax.random.key(run.settings["seed"]), 1)
+        tasks, disturbance = world.draw(key, config.held_out, config.decisions, 0.0, disturbed=False)
+        slots = slots_of_clusters(module, tasks, disturbance)
+        choosers["clusters"] = SlotOfCluster(module.parts.mixture, slots)
+    settings = ClassifierSettings(
+        inference=module.name,
+        inference_hash=tree_hash(module.parts.module),
+        latent=module.parts.module.encoder.latent,
+        families=classifier.families,
+        hidden=config.hidden,
+        components=len(slots),
+        training=run.training(config),
+    )
+    rows = {}
+    for name, chooser in choosers.items():
+        for disturbed in (False, True):
+            where = "disturbed" if disturbed else "nominal"
+            wrong = wrong_slots(chooser, module, world, config, disturbed=disturbed)
+            rows[f"wrong slots by {name}, {where} toys, from {KNOWN_FROM} decisions on"] = f"{100 * wrong:.3f} %"
+    if module.parts.mixture is not None:
+        active = np.flatnonzero(np.asarray(module.parts.mixture.active))
+        rows["slots of clusters"] = ", ".join(f"{k}: {family_names()[slots[k]]}" for k in active)
+    what = (
+        f"Chooses a tracker's slot from a belief of '{module.name}': a classifier trained with labels on the toy, and "
+        f"a slot for each of the mixture's components, found without labels as the one that earns most on the toy."
+    )
+    return save("classifier", settings, SlotParts(classifier, slots), run, f"Slots: {module.name}", what, rows)
+
+
+def wrong_slots(
+    chooser: SlotChooser, module: Inference, world: ToyWorld, config: ClassifierConfig, *, disturbed: bool
+) -> float:
+    """Share of decisions with another slot than the task's, once something can be known, on held-out tasks."""
+    tasks, disturbance = world.draw(
+        jax.random.key(2**31 - 1), config.held_out, config.decisions, 0.0, disturbed=disturbed
+    )
+    belief = act(module, tasks, disturbance).belief
+    chosen = np.asarray(eqx.filter_jit(chooser)(belief))
+    return float(np.mean(chosen[KNOWN_FROM:] != np.asarray(tasks.family)[KNOWN_FROM:]))
 
 
 def _optimiser(config: ClassifierConfig) -> optax.GradientTransformation:

@@ -1,7 +1,9 @@
 """Settings of a meta-training run."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
+
+from msgspec import Meta
 
 from rebody.agents.parts import told_view
 from rebody.bodies.toys import Randomisation
@@ -10,7 +12,7 @@ from rebody.control.sac import SACConfig
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
 from rebody.inference.mixture.settings import MixtureConfig
-from rebody.ranges import Copies, Count, Decisions, NotNegative, Number, Positive, Share
+from rebody.ranges import Copies, Count, Decisions, Episodes, NotNegative, Number, Positive, Share
 from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
 
 
@@ -68,6 +70,14 @@ class MetaConfig:
     """Iterations after that in which inference is frozen and the policy learns on."""
     evaluate_every: Count = 10
     """Iterations from one measurement on held-out tasks to the next."""
+    held_out: Episodes = 200
+    """Held-out tasks of a measurement."""
+    held_out_at_end: Episodes = 500
+    """Held-out tasks of the artifact's own figures."""
+    held_out_s: Annotated[float, Meta(ge=6, le=3600)] = 20.0
+    """Length of their episodes [s]; figures speak of the sixth second."""
+    begins_at_start: Share = 0.3
+    """Share of windows that begin with their episode, when nothing is known: the first decisions count."""
     inference_updates: Number = 128
     """Updates of encoder and decoder in an iteration."""
     policy_updates: Number = 512

@@ -1,16 +1,42 @@
 """Collecting episodes on the toy, and what is kept of them."""
 
+from dataclasses import dataclass
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, PRNGKeyArray
 
-from rebody.bodies.toys import Toy, ToyState, no_disturbance
+from rebody.agents.configs import understood
+from rebody.bodies.toys import Randomisation, Toy, ToyState, no_disturbance
 from rebody.control.sac import Actor
 from rebody.inference import Encoder, InferenceModule
-from rebody.tasks import reward
+from rebody.store import Artifact
+from rebody.tasks import TaskDistribution, reward
 from rebody.training.inference.config import MetaConfig
 from rebody.types import AnyArray, Belief, GlobalState, Task, Transition
+
+
+@dataclass(frozen=True)
+class ToyWorld:
+    """The tasks and disturbances that a module was trained on, out of its artifact."""
+
+    tasks: TaskDistribution
+    randomisation: Randomisation
+
+    @classmethod
+    def of(cls, module: Artifact) -> "ToyWorld":
+        """From the artifact's training settings; RebodyError where they do not tell."""
+        training = module.config["training"]
+        said = {name: training[name] for name in ("tasks", "randomisation") if name in training}
+        return understood(said, cls, module.name)
+
+    def draw(self, key: PRNGKeyArray, episodes: int, decisions: int, switch_share: float, *, disturbed: bool):
+        """Active tasks [time, episode], and how each episode's toy departs from the nominal one."""
+        task_key, disturbance_key = jax.random.split(key)
+        tasks = self.tasks.sample_episodes(task_key, episodes, decisions, switch_share)
+        rough = self.randomisation.sample(disturbance_key, (episodes,))
+        return jax.tree.map(lambda leaf: leaf.T, tasks), rough if disturbed else no_disturbance((episodes,))
 
 
 class Roles(eqx.Module):
@@ -42,12 +68,7 @@ class Episodes(eqx.Module):
 
 @eqx.filter_jit
 def collect(
-    module: InferenceModule,
-    actor: Actor,
-    toy: Toy,
-    config: MetaConfig,
-    roles: Roles,
-    key: PRNGKeyArray,
+    module: InferenceModule, actor: Actor, toy: Toy, config: MetaConfig, roles: Roles, key: PRNGKeyArray
 ) -> Episodes:
     """Let toys act on hidden tasks by what they believe.
 

@@ -9,16 +9,16 @@ from jaxtyping import Bool, Float, Int
 from rebody.agents.build import build_agent
 from rebody.agents.parts import Inference, InferenceParts
 from rebody.agents.rollout import Episodes, rollout_on_toy
-from rebody.bodies.toys import Toy, no_disturbance
+from rebody.bodies.toys import Toy
 from rebody.inference.contract import Contract
 from rebody.inference.probe import Probe, fit_probe
 from rebody.tasks import base_task, family_index
-from rebody.tasks.figures import final_error
+from rebody.training.held_out import errors_of
 from rebody.training.inference.clusters import agreement, draw, new_mixture
 from rebody.training.inference.config import MetaConfig
-from rebody.types import Task
+from rebody.training.inference.episodes import ToyWorld
+from rebody.types import DECISION_DT, Task
 
-DECISIONS = 200
 BASE_TASK_AT = 10
 """Decisions after which the base task (family and sign) should be known."""
 PROBED_FROM = 20
@@ -41,19 +41,25 @@ class Outcome:
         """Mean over episodes of the summed reward."""
         return float(self.episodes.reward.sum(0).mean())
 
+    @property
+    def figures(self) -> dict[str, float]:
+        """Final errors of each family, and the return."""
+        last = jax.tree.map(lambda leaf: leaf[-1], self.tasks)
+        return errors_of(last, self.episodes.state) | {"return": self.total_return}
+
 
 def measure(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
     """Final errors [m, m/s, rad], return and the oracle's, and how sharply beliefs read out."""
     probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
     oracle = act("oracle", parts, toy, config, held_out)
-    return _errors(outcome, config) | {"oracle return": oracle.total_return} | _readings(probe, outcome, config)
+    return outcome.figures | {"oracle return": oracle.total_return} | _readings(probe, outcome, config)
 
 
 def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
     """`measure`, and: the return with the exact posterior, sharpness on disturbed toys, changes of the task, and
     clusters where there is a mixture."""
     probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
-    figures = _errors(outcome, config)
+    figures = outcome.figures
     for kind in ("bayes", "oracle"):
         figures[f"{kind} return"] = act(kind, parts, toy, config, held_out).total_return
     figures |= _readings(probe, outcome, config)
@@ -74,13 +80,12 @@ def act(
     switch_share: float = 0.0,
 ) -> Outcome:
     """An agent of a named kind on held-out tasks; the seeds are none that training uses."""
-    task_key, disturbance_key = jax.random.split(jax.random.fold_in(jax.random.key(2**31 - 1), seed))
-    tasks = config.tasks.sample_episodes(task_key, held_out, DECISIONS, switch_share)
-    tasks = jax.tree.map(lambda leaf: leaf.T, tasks)
-    rough = config.randomisation.sample(disturbance_key, (held_out,))
+    key, decisions = jax.random.fold_in(jax.random.key(2**31 - 1), seed), round(config.held_out_s / DECISION_DT)
+    world = ToyWorld(config.tasks, config.randomisation)
+    tasks, disturbance = world.draw(key, held_out, decisions, switch_share, disturbed=disturbed)
     inference = Inference("in training", contract_of(config), parts, toy)
     agent = build_agent(kind, inference, tasks, horizon=1)
-    episodes = rollout_on_toy(agent, toy, tasks, config.reward, rough if disturbed else no_disturbance((held_out,)))
+    episodes = rollout_on_toy(agent, toy, tasks, config.reward, disturbance)
     return Outcome(*jax.tree.map(np.asarray, (tasks, episodes)))
 
 
@@ -97,29 +102,21 @@ def contract_of(config: MetaConfig) -> Contract:
 def fit(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int, *, disturbed: bool = False) -> Probe:
     """A probe of other episodes than those that figures are taken on."""
     outcome = act("reuse", parts, toy, config, held_out, seed=3 if disturbed else 1, disturbed=disturbed)
-    latent = np.asarray(outcome.episodes.belief.mean)[PROBED_FROM:]
-    tasks = jax.tree.map(lambda leaf: leaf[PROBED_FROM:].ravel(), outcome.tasks)
-    return fit_probe(latent.reshape(-1, latent.shape[-1]), tasks.family, tasks.target)
+    return probe_of(outcome.tasks, outcome.episodes)
 
 
-def _errors(outcome: Outcome, config: MetaConfig) -> dict[str, float]:
-    """Final errors of each family, and the return."""
-    errors = final_error(jax.tree.map(lambda leaf: leaf[-1], outcome.tasks), outcome.episodes.state)
-    figures = {}
-    for name, of_family in _by_family(outcome.tasks, config):
-        figures[f"{name} median"] = float(np.median(errors[of_family]))
-        figures[f"{name} p95"] = float(np.percentile(errors[of_family], 95))
-    return figures | {"return": outcome.total_return}
+def probe_of(tasks: Task, episodes: Episodes) -> Probe:
+    """What can be read linearly from the beliefs of episodes."""
+    latent = np.asarray(episodes.belief.mean)[PROBED_FROM:]
+    active = jax.tree.map(lambda leaf: leaf[PROBED_FROM:].ravel(), tasks)
+    return fit_probe(latent.reshape(-1, latent.shape[-1]), active.family, active.target)
 
 
 def _readings(probe: Probe, outcome: Outcome, config: MetaConfig) -> dict[str, float]:
     """Share of right base tasks, early and later on, and R^2 of each family's target."""
     _, target = read(probe, outcome)
     right = is_right(probe, outcome)
-    figures = {
-        "base task": float(right[BASE_TASK_AT - 1].mean()),
-        "base task later": float(right[PROBED_FROM:].mean()),
-    }
+    figures = {"base task": float(right[BASE_TASK_AT - 1].mean()), "base task later": float(right[PROBED_FROM:].mean())}
     for name, of_family in _by_family(outcome.tasks, config):
         wanted = outcome.tasks.target[PROBED_FROM:, of_family]
         figures[f"{name} R2"] = float(1 - np.var(target[PROBED_FROM:, of_family] - wanted) / np.var(wanted))

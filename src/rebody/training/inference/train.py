@@ -28,18 +28,16 @@ from rebody.jax_settings import own_jax_settings
 from rebody.ranges import check_ranges
 from rebody.tasks import base_task
 from rebody.training.arrival import arrival_bonus
+from rebody.training.descent import descend
 from rebody.training.inference.clusters import refit
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, collect, refresh_beliefs, roles
 from rebody.training.inference.measure import measure
 from rebody.training.inference.report import save_inference
-from rebody.training.run import Metrics, Run
-from rebody.types import AnyArray, Transition, Tree
+from rebody.training.replay import store_group
+from rebody.training.run import Metrics, Run, measured
+from rebody.types import AnyArray, Transition
 
-HELD_OUT = 200
-"""Held-out tasks of an evaluation."""
-BEGINS_AT_START = 0.3
-"""Share of windows that begin with their episode, when nothing is known: the first decisions count."""
 LENGTH = ("wander_iterations", "joint_iterations", "policy_iterations")
 """Settings that say how long the parts of a run are, in their order."""
 
@@ -50,7 +48,7 @@ class RunState(eqx.Module):
     module: InferenceModule
     optimiser: optax.OptState
     sac: SACState  # the high-level policy
-    told: SACState  # the same policy, told the task: the toy's oracle
+    privileged: SACState  # the same policy, told the task: the toy's oracle
     clusters: Clusters
     replay: Episodes  # [group, episode, time]
     iteration: Int[Array, ""]
@@ -78,20 +76,20 @@ def train_inference(
         toy, key = make_toy(config.toy), jax.random.key(seed)
         state = run.restore(initial_state(config, toy, key, init_from))
         state = run.loop(state, lambda state: iterate(state, toy, config, key), config.iterations, "inference")
-        return save_inference(trained_parts(state, config), toy, config, run, seed, title)
+        return save_inference(trained_parts(state, config), toy, config, run, title)
 
 
 def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
     """One turn of the loop."""
     iteration = int(state.iteration)
     keys = jax.random.split(jax.random.fold_in(key, iteration), 3)
-    module, optimiser, policy, told = state.module, state.optimiser, state.sac, state.told
-    clusters = state.clusters
+    module, optimiser, clusters = state.module, state.optimiser, state.clusters
+    policy, privileged = state.sac, state.privileged
 
     acting = roles(config.episodes, all_wander=iteration < config.wander_iterations)
     episodes = collect(module, policy.actor, toy, config, acting, keys[0])
     metrics = {"return": episodes.reward[acting.decides].sum(-1).mean()}
-    replay, stored = store(state.replay, episodes, state.iteration)
+    replay, stored = store_group(state.replay, episodes, state.iteration)
     if iteration < config.inference_iterations:
         if config.prior == "mixture" and iteration >= config.mixture.from_iteration:
             rng = np.random.default_rng(np.asarray(jax.random.key_data(keys[1])))
@@ -105,17 +103,19 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
         if iteration < config.inference_iterations:
             replay = refresh_beliefs(module.encoder, replay, config.episodes // 2)
             # it acts in no episode itself: later ones, of a policy that hardly explores, would lead it astray
-            told_replay = tell(replay, task_code(config.target_ranges))
-            told, told_metrics = update_policy(told, told_replay, stored, config, config.told_view, keys[2])
-            metrics |= {f"told/{name}": value for name, value in told_metrics.items()}
+            told = with_tasks(replay, task_code(config.target_ranges))
+            privileged, learned = update_policy(privileged, told, stored, config, config.told_view, keys[2])
+            metrics |= {f"told/{name}": value for name, value in learned.items()}
         interpreted = eqx.tree_at(lambda e: e.belief, replay, module.decoder.interpret(replay.belief))
-        policy, policy_metrics = update_policy(policy, interpreted, stored, config, config.policy_view, keys[2])
-        metrics |= policy_metrics
-    state = RunState(module, optimiser, policy, told, clusters, replay, state.iteration + 1)
-    if (iteration + 1) % config.evaluate_every == 0:
-        figures = measure(trained_parts(state, config), toy, config, HELD_OUT)
-        metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
-    return state, {name: float(value) for name, value in metrics.items()}
+        policy, learned = update_policy(policy, interpreted, stored, config, config.policy_view, keys[2])
+        metrics |= learned
+    state = RunState(module, optimiser, policy, privileged, clusters, replay, state.iteration + 1)
+    return state, measured(
+        metrics,
+        iteration,
+        config.evaluate_every,
+        lambda: measure(trained_parts(state, config), toy, config, config.held_out),
+    )
 
 
 def latent_prior(clusters: Clusters, config: MetaConfig) -> Prior:
@@ -131,13 +131,13 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     module = InferenceModule(config.inference, toy.actions, module_key)
     seen = config.policy_view.size(config.inference.latent)
     seen_told = config.told_view.size(2 * len(config.tasks.families))
-    policy, told = (sac.initial_state(size, toy.actions, config.sac, sac_key) for size in (seen, seen_told))
+    policy, privileged = (sac.initial_state(size, toy.actions, config.sac, sac_key) for size in (seen, seen_told))
     clusters = no_clusters(config.mixture.maximum, config.inference.clustered)
     if init_from is not None:
         parts = load_inference(init_from).parts
-        module = take_over(parts.module, module, init_from)
+        module = load_pretrained(parts.module, module, init_from)
         policy = sac.take_over(policy, parts.high_level.actor, init_from)
-        told = sac.take_over(told, parts.told_policy.actor, init_from)
+        privileged = sac.take_over(privileged, parts.told_policy.actor, init_from)
         if parts.mixture is not None and parts.mixture.mean.shape == clusters.prior.mean.shape:
             clusters = clusters_of(parts.mixture)
     one_group = jax.eval_shape(lambda: collect(module, policy.actor, toy, config, roles(config.episodes, True), key))
@@ -145,14 +145,14 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
         module=module,
         optimiser=optimiser_of(config).init(eqx.filter(module, eqx.is_array)),
         sac=policy,
-        told=told,
+        privileged=privileged,
         clusters=clusters,
         replay=jax.tree.map(lambda leaf: jnp.zeros((config.groups, *leaf.shape), leaf.dtype), one_group),
         iteration=jnp.zeros((), jnp.int32),
     )
 
 
-def take_over(trained: InferenceModule, fresh: InferenceModule, name: str) -> InferenceModule:
+def load_pretrained(trained: InferenceModule, fresh: InferenceModule, name: str) -> InferenceModule:
     """The trained module in place of a fresh one; RebodyError if its sizes differ."""
     if jax.tree.map(jnp.shape, trained) != jax.tree.map(jnp.shape, fresh):
         raise RebodyError(f"cannot start from '{name}': its networks have other sizes than these settings.")
@@ -163,20 +163,18 @@ def trained_parts(state: RunState, config: MetaConfig) -> InferenceParts:
     """What is kept of a run, its probe not yet fitted."""
     by_belief, by_task = (
         HighLevelPolicy(policy.averaged_actor, view)
-        for policy, view in ((state.sac, config.policy_view), (state.told, config.told_view))
+        for policy, view in ((state.sac, config.policy_view), (state.privileged, config.told_view))
     )
-    unfitted = jnp.zeros((config.inference.latent + 1, len(config.tasks.families)))
-    probe = Probe(jnp.asarray(config.tasks.families), unfitted, unfitted)
     mixture = jax.tree.map(jnp.asarray, state.clusters.prior) if config.prior == "mixture" else None
-    return InferenceParts(state.module, by_belief, by_task, probe, mixture)
+    return InferenceParts(
+        state.module, by_belief, by_task, unfitted_probe(config.inference.latent, config.tasks.families), mixture
+    )
 
 
-@eqx.filter_jit
-def store(replay: Tree, group: Tree, iteration: Int[Array, ""]) -> tuple[Tree, Int[Array, ""]]:
-    """The ring with a group more in place of its oldest, and how many groups it holds."""
-    groups = len(jax.tree.leaves(replay)[0])
-    replay = jax.tree.map(lambda ring, new: ring.at[iteration % groups].set(new), replay, group)
-    return replay, jnp.minimum(iteration + 1, groups)
+def unfitted_probe(latent: int, families: tuple[int, ...]) -> Probe:
+    """A probe that reads nothing."""
+    weights = jnp.zeros((latent + 1, len(families)))
+    return Probe(jnp.asarray(families), weights, weights)
 
 
 @eqx.filter_jit
@@ -190,22 +188,13 @@ def update_inference(
     key: PRNGKeyArray,
 ) -> tuple[InferenceModule, optax.OptState, dict[str, Float[Array, ""]]]:
     """Steps of encoder and decoder on windows of stored episodes."""
-    arrays, static = eqx.partition(module, eqx.is_array)
 
-    def step(carry, key):
-        arrays, optimiser = carry
+    def loss_of(module: InferenceModule, key: PRNGKeyArray):
         sample_key, loss_key = jax.random.split(key)
         evidence = sample_evidence(replay, stored, config, sample_key)
-        gradient, metrics = jax.grad(
-            lambda a: loss(eqx.combine(a, static), evidence, prior, config.inference, loss_key),
-            has_aux=True,
-        )(arrays)
-        updates, optimiser = optimiser_of(config).update(gradient, optimiser)
-        return (eqx.apply_updates(arrays, updates), optimiser), metrics
+        return loss(module, evidence, prior, config.inference, loss_key)
 
-    keys = jax.random.split(key, config.inference_updates)
-    (arrays, optimiser), metrics = jax.lax.scan(step, (arrays, optimiser), keys)
-    return eqx.combine(arrays, static), optimiser, jax.tree.map(jnp.mean, metrics)
+    return descend(module, optimiser, optimiser_of(config), loss_of, jax.random.split(key, config.inference_updates))
 
 
 @eqx.filter_jit
@@ -220,7 +209,7 @@ def update_policy(
     return sac.update_many(policy, batch_of, None, jax.random.split(key, config.policy_updates), config.sac)
 
 
-def tell(episodes: Episodes, code: TaskCode) -> Episodes:
+def with_tasks(episodes: Episodes, code: TaskCode) -> Episodes:
     """The same episodes with the truth in place of what was believed; the last task lasts beyond the end."""
     active = jax.tree.map(lambda leaf: jnp.concatenate([leaf, leaf[..., -1:]], axis=-1), episodes.task)
     return eqx.tree_at(lambda e: e.belief, episodes, code(active))
@@ -233,7 +222,7 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
     group = jax.random.randint(keys[0], (size, 1), 0, stored)
     episode = jax.random.randint(keys[1], (size, 1), 0, config.episodes)
     begin = jax.random.randint(keys[2], (size, 1), 0, config.decisions - window + 1)
-    begin = jnp.where(jax.random.bernoulli(keys[3], BEGINS_AT_START, (size, 1)), 0, begin)
+    begin = jnp.where(jax.random.bernoulli(keys[3], config.begins_at_start, (size, 1)), 0, begin)
     seen = begin + jnp.arange(window)
     decoded = jax.random.randint(keys[4], (size, config.inference.decoded), 0, config.decisions)
 

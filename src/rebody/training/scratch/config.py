@@ -8,10 +8,10 @@ from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
-from rebody.ranges import Copies, Count, Decisions, NotNegative, Number, Share
+from rebody.ranges import Copies, Count, Decisions, Episodes, NotNegative, Number, Seconds, Share
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.presets import goal_velocity
-from rebody.training.minds import within_reach
+from rebody.training.task_inference import within_reach
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,14 @@ class ScratchConfig:
     """Length of the run; an iteration is an episode of every robot."""
     evaluate_every: Count = 32
     """Iterations from one measurement on held-out tasks to the next."""
+    held_out: Episodes = 100
+    """Held-out tasks of a measurement."""
+    held_out_s: Seconds = 20.0
+    """Length of their episodes [s]."""
+    refresh_every: Count = 8
+    """Iterations after which today's encoder goes along all stored episodes again."""
+    decides_every: Count = 4
+    """Of so many robots one takes the most likely action, as it will when it is used."""
     inference_updates: Number = 64
     """Updates of encoder and decoder in an iteration."""
     policy_updates: Number = 384

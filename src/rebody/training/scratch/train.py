@@ -15,32 +15,32 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
+from rebody.agents.agent import FlatAgent
+from rebody.agents.configs import ScratchSettings
+from rebody.agents.controller import FlatController
 from rebody.agents.parts import ScratchParts, load_scratch
-from rebody.bodies import RobotBatch, load_robot
-from rebody.bodies.check import require_ready
+from rebody.agents.rollout import Episodes as Rollouts
+from rebody.bodies import RobotBatch, RobotSpec
 from rebody.control import sac
-from rebody.control.flat import FlatPolicy, FlatView
+from rebody.control.flat import FlatPolicy
 from rebody.control.high_level import told_code
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.inference.module import InferenceModule
 from rebody.inference.prior import SplitPrior, unit_gaussian
-from rebody.inference.probe import Probe
 from rebody.jax_settings import own_jax_settings
-from rebody.ranges import check_ranges
-from rebody.training.inference.config import MetaConfig
+from rebody.training.card import save
+from rebody.training.held_out import act, figures_of, rows_of
 from rebody.training.inference.episodes import Episodes, refresh_beliefs
-from rebody.training.inference.train import optimiser_of, store, take_over, tell, update_inference
-from rebody.training.minds import Minds, listen, put_on_feet
-from rebody.training.motion import told_reward
-from rebody.training.run import Metrics, Run
+from rebody.training.inference.measure import contract_of, probe_of
+from rebody.training.inference.presets import goal_velocity
+from rebody.training.inference.train import load_pretrained, optimiser_of, unfitted_probe, update_inference, with_tasks
+from rebody.training.motion import decision, privileged_reward, put_on_feet
+from rebody.training.off_policy import ready_robot
+from rebody.training.replay import store_group
+from rebody.training.run import Metrics, Run, measured
 from rebody.training.scratch.config import ScratchConfig
-from rebody.training.scratch.report import measure, save_scratch
-from rebody.types import AnyArray, Belief, Task, global_state
-
-REFRESH_EVERY = 8
-"""Iterations after which today's encoder goes along all stored episodes again."""
-DECIDES_EVERY = 4
-"""Of so many robots one takes the most likely action, as it will when it is used."""
+from rebody.training.task_inference import TaskInference, begin_inference, infer
+from rebody.types import AnyArray, Belief, GlobalState, Task, global_state
 
 
 class ControlSteps(eqx.Module):
@@ -87,115 +87,93 @@ def train_scratch(
     RebodyError if the robot is not ready, `out` holds another run, or `init_from` has other sizes; Interrupted on
     Ctrl-C.
     """
-    check_ranges(config)
-    spec = load_robot(robot)
-    require_ready(spec)
+    spec = ready_robot(robot, config)
     with Run(
         out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume, finish=finish
     ) as run:
-        batch, meta = RobotBatch(spec, config.robots), config.meta(spec.reach)
-        state = run.restore(initial_state(config, meta, batch, jax.random.key(seed), init_from))
-        state = run.loop(state, lambda state: iterate(state, batch, config, meta, seed), config.iterations, "scratch")
-        return save_scratch(trained_parts(state, meta), spec, config, meta, run, seed)
+        batch = RobotBatch(spec, config.robots)
+        state = run.restore(initial_state(config, batch, jax.random.key(seed), init_from))
+        state = run.loop(state, lambda state: iterate(state, batch, config, seed), config.iterations, "scratch")
+        return save_scratch(trained_parts(state, config), spec, config, run)
 
 
-def iterate(
-    state: RunState, batch: RobotBatch, config: ScratchConfig, meta: MetaConfig, seed: int
-) -> tuple[RunState, Metrics]:
+def iterate(state: RunState, batch: RobotBatch, config: ScratchConfig, seed: int) -> tuple[RunState, Metrics]:
     """An episode of every robot, then updates of the module and of the policy, now and then an evaluation."""
-    iteration = int(state.iteration)
+    iteration, meta = int(state.iteration), config.meta(batch.spec.reach)
     rng = np.random.default_rng((seed, 2, iteration))
     keys = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration), 3)
-    fresh = collect(state.module, state.sac.actor, batch, config, meta, rng, keys[0])
-    replay, stored = store(state.replay, fresh, state.iteration)
+
+    fresh = collect(state, batch, config, rng, keys[0])
+    replay, stored = store_group(state.replay, fresh, state.iteration)
     prior = SplitPrior(unit_gaussian, config.inference.kinds, config.inference.kind_weight)
     module, optimiser, metrics = update_inference(
         state.module, state.optimiser, replay.episodes, stored, prior, meta, keys[1]
     )
-    if (iteration + 1) % REFRESH_EVERY == 0:
+    if (iteration + 1) % config.refresh_every == 0:
         replay = replace(replay, episodes=refresh_beliefs(module.encoder, replay.episodes, config.robots))
     policy, learned = update_policy(state.sac, module, replay, stored, config, keys[2])
     state = RunState(module, optimiser, policy, replay, state.iteration + 1)
     metrics |= learned | {"task_reward": fresh.episodes.reward.mean()}
-    if (iteration + 1) % config.evaluate_every == 0:
-        figures = measure(trained_parts(state, meta), meta, batch.spec)
-        metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
-    return state, {name: float(value) for name, value in metrics.items()}
+    return state, measured(
+        metrics, iteration, config.evaluate_every, lambda: measure(trained_parts(state, config), config, batch.spec)
+    )
 
 
 def collect(
-    module: InferenceModule,
-    actor: Actor,
-    batch: RobotBatch,
-    config: ScratchConfig,
-    meta: MetaConfig,
-    rng: np.random.Generator,
-    key: PRNGKeyArray,
+    state: RunState, batch: RobotBatch, config: ScratchConfig, rng: np.random.Generator, key: PRNGKeyArray
 ) -> Replay:
     """One group: every robot acts on a hidden task by what it believes, or by what it is told."""
     task_key, action_key = jax.random.split(key)
+    meta, encoder = config.meta(batch.spec.reach), state.module.encoder
     tasks = meta.tasks.sample_episodes(task_key, config.robots, config.decisions, config.switch_share)
     tasks = jax.tree.map(np.asarray, tasks)
     batch.reset(rng)
     batch.qpos[:, batch.spec.root_addresses[0]] = rng.uniform(-config.start, config.start, batch.size)
-    encoder, shape, here = module.encoder, (batch.size,), batch.spec.observe(batch.qpos, batch.qpos)
-    minds = Minds(encoder.initial(shape), encoder.prior(shape), here, jax.tree.map(lambda leaf: leaf[:, 0], tasks))
-    states, beliefs, actions, rewards, steps = [here], [minds.belief], [], [], []
-    for decision in range(config.decisions):
-        minds = replace(minds, task=jax.tree.map(lambda leaf: leaf[:, decision], tasks))  # noqa: B023 (used at once)
-        key = jax.random.fold_in(action_key, decision)
-        before = batch.qpos.copy()
-        held = hold(batch, minds, module, actor, config, rng, key)
-        minds, earned = listen(encoder, minds, batch.spec.observe(batch.qpos, before), meta.reward)
+    here, first = batch.spec.observe(batch.qpos, batch.qpos), jax.tree.map(lambda leaf: leaf[:, 0], tasks)
+    known = begin_inference(encoder, here, first)
+    states, beliefs, actions, rewards, steps = [here], [known.belief], [], [], []
+    for i in range(config.decisions):
+        known = replace(known, task=jax.tree.map(lambda leaf: leaf[:, i], tasks))  # noqa: B023 (used at once)
+        now, held = act_for_a_decision(state, known, batch, config, rng, jax.random.fold_in(action_key, i))
+        known, earned = infer(encoder, known, now, meta.reward)
         steps += held
-        states.append(minds.state)
-        beliefs.append(minds.belief)
+        states.append(known.state)
+        beliefs.append(known.belief)
         actions.append(np.mean([step.action for step in held], axis=0))
         rewards.append(earned)
     along = [jax.tree.map(lambda *rows: np.stack(rows, axis=1), *rows) for rows in (states, beliefs, actions, rewards)]
     return Replay(Episodes(tasks, *along), jax.tree.map(lambda *rows: np.stack(rows), *steps))
 
 
-def hold(
+def act_for_a_decision(
+    state: RunState,
+    known: TaskInference,
     batch: RobotBatch,
-    minds: Minds,
-    module: InferenceModule,
-    actor: Actor,
     config: ScratchConfig,
     rng: np.random.Generator,
     key: PRNGKeyArray,
-) -> list[ControlSteps]:
-    """The control steps of a decision, all by the same belief."""
-    understood, steps = understand(module, minds, config), []
-    for step in range(batch.spec.steps_per_decision):
+) -> tuple[GlobalState, list[ControlSteps]]:
+    """Control steps by the same belief; the state after them, and the steps."""
+    interpreted, steps = interpret(state.module, known, config), []
+
+    def control_step(i: int) -> None:
         joints, x, before = batch.joint_state(), batch.x.astype(np.float32), batch.qpos.copy()
-        action = _explore(actor, config.view, joints, x, understood, jax.random.fold_in(key, step))
-        batch.step(np.asarray(action))
-        seen = ControlSteps(
-            joints=joints,
-            x=x,
-            action=np.asarray(action),
-            reward=told_reward(batch, before, minds.task, np.asarray(action), config.reward),
-            next_joints=batch.joint_state(),
-            next_x=batch.x.astype(np.float32),
-        )
-        steps.append(seen)
+        action = np.asarray(_explore(state.sac.actor, config, joints, x, interpreted, jax.random.fold_in(key, i)))
+        batch.step(action)
+        reward = privileged_reward(batch, before, known.task, action, config.reward)
+        steps.append(ControlSteps(joints, x, action, reward, batch.joint_state(), batch.x.astype(np.float32)))
         put_on_feet(batch, rng)
-    return steps
+
+    return decision(batch, control_step)[0], steps
 
 
 @eqx.filter_jit
 def update_policy(
-    policy: SACState,
-    module: InferenceModule,
-    replay: Replay,
-    stored,
-    config: ScratchConfig,
-    key: PRNGKeyArray,
+    policy: SACState, module: InferenceModule, replay: Replay, stored, config: ScratchConfig, key: PRNGKeyArray
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """Steps of soft actor-critic on stored control steps, with today's beliefs."""
     believed = module.decoder.interpret(replay.episodes.belief)
-    told = tell(replay.episodes, told_code(config.inference.places)).belief
+    told = with_tasks(replay.episodes, told_code(config.inference.places)).belief
 
     def batch_of(_: None, key: PRNGKeyArray) -> SACBatch:
         return sample_steps(replay, believed, told, stored, config, key)
@@ -232,7 +210,7 @@ def sample_steps(
 
 
 def initial_state(
-    config: ScratchConfig, meta: MetaConfig, batch: RobotBatch, key: PRNGKeyArray, init_from: str | None = None
+    config: ScratchConfig, batch: RobotBatch, key: PRNGKeyArray, init_from: str | None = None
 ) -> RunState:
     """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
@@ -242,11 +220,11 @@ def initial_state(
     policy = sac.initial_state(seen, actions, config.sac, sac_key)
     if init_from is not None:
         parts = load_scratch(init_from).parts
-        module = take_over(parts.module, module, init_from)
+        module = load_pretrained(parts.module, module, init_from)
         policy = sac.take_over(policy, parts.policy.actor, init_from)
     return RunState(
         module=module,
-        optimiser=optimiser_of(meta).init(eqx.filter(module, eqx.is_array)),
+        optimiser=optimiser_of(config.meta(batch.spec.reach)).init(eqx.filter(module, eqx.is_array)),
         sac=policy,
         replay=_no_replay(config, batch),
         iteration=jnp.zeros((), jnp.int32),
@@ -273,23 +251,61 @@ def _no_replay(config: ScratchConfig, batch: RobotBatch) -> Replay:
     )
 
 
-def trained_parts(state: RunState, meta: MetaConfig) -> ScratchParts:
+def trained_parts(state: RunState, config: ScratchConfig) -> ScratchParts:
     """What is kept of a run, its probe not yet fitted."""
-    unfitted = jnp.zeros((meta.inference.latent + 1, len(meta.tasks.families)))
-    probe = Probe(jnp.asarray(meta.tasks.families), unfitted, unfitted)
-    return ScratchParts(state.module, FlatPolicy(state.sac.averaged_actor, FlatView(meta.inference.places)), probe)
+    families = goal_velocity().tasks.families
+    policy = FlatPolicy(state.sac.averaged_actor, config.view)
+    return ScratchParts(state.module, policy, unfitted_probe(config.inference.latent, families))
 
 
 @eqx.filter_jit
-def understand(module: InferenceModule, minds: Minds, config: ScratchConfig) -> Belief:
+def interpret(module: InferenceModule, known: TaskInference, config: ScratchConfig) -> Belief:
     """What each robot goes by: the first ones are told."""
     robots = jnp.arange(config.robots)[:, None]
-    told, believed = told_code(config.inference.places)(minds.task), module.decoder.interpret(minds.belief)
+    told, believed = told_code(config.inference.places)(known.task), module.decoder.interpret(known.belief)
     return jax.tree.map(lambda yes, no: jnp.where(robots < config.told_share * config.robots, yes, no), told, believed)
 
 
 @eqx.filter_jit
-def _explore(actor: Actor, view: FlatView, joints, x, understood: Belief, key: PRNGKeyArray):
-    observation = view(joints, x, understood)
-    decides = jnp.arange(len(x))[:, None] % DECIDES_EVERY == 0
+def _explore(actor: Actor, config: ScratchConfig, joints, x, interpreted: Belief, key: PRNGKeyArray):
+    observation = config.view(joints, x, interpreted)
+    decides = jnp.arange(len(x))[:, None] % config.decides_every == 0
     return jnp.where(decides, actor(observation), actor.sample(observation, key)[0])
+
+
+def measure(parts: ScratchParts, config: ScratchConfig, spec: RobotSpec) -> dict[str, float]:
+    """Final error on held-out tasks of each family, return, share that fell."""
+    return figures_of(*act_on(parts, config, spec, seed=0))
+
+
+def act_on(parts: ScratchParts, config: ScratchConfig, spec: RobotSpec, *, seed: int) -> tuple[Task, Rollouts]:
+    """Robots on held-out tasks."""
+    agent = FlatAgent(inferrer=parts.module.encoder, reader=parts.probe, stride=1)
+    controller, meta = FlatController(parts.policy, parts.module.decoder), config.meta(spec.reach)
+    return act(agent, controller, spec, meta.tasks, meta.reward, config.held_out, config.held_out_s, seed)
+
+
+def save_scratch(parts: ScratchParts, spec: RobotSpec, config: ScratchConfig, run: Run) -> Path:
+    """Measure, fit the probe on other tasks, write artifact and card."""
+    figures = measure(parts, config, spec)
+    parts = eqx.tree_at(lambda p: p.probe, parts, probe_of(*act_on(parts, config, spec, seed=1)))
+    actor = parts.policy.actor
+    settings = ScratchSettings(
+        robot=spec.name,
+        contract=contract_of(config.meta(spec.reach)),
+        inference=config.inference,
+        observations=actor.observations,
+        actions=actor.actions,
+        hidden=config.sac.hidden,
+        projections=config.sac.projections,
+        training=run.training(config),
+    )
+    rows = rows_of(figures, config.held_out, config.held_out_s)
+    decisions = run.iterations * config.robots * config.decisions
+    what = (
+        f"Inference module and joint policy of '{spec.name}', learned together on the robot: nothing is reused. "
+        f"Trained on {decisions * spec.steps_per_decision:,} control steps with "
+        f"{run.iterations * config.policy_updates:,} updates of the policy and "
+        f"{run.iterations * config.inference_updates:,} of the module."
+    )
+    return save("scratch", settings, parts, run, f"From scratch: {spec.name}", what, rows)

@@ -5,6 +5,7 @@ task, and where it then is, or how fast it is, becomes the robot's subgoal. That
 thesis' horizon of 1 (5.6.2, 6.4); a predictor thereby belongs to a robot and its tracker, not to a module.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import equinox as eqx
@@ -17,14 +18,46 @@ from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch
 from rebody.bodies.robot import Reach
-from rebody.control.sac import SACBatch
-from rebody.control.step_predictor import LOWEST_REWARD, step_reward, steps_of
+from rebody.control.sac import Actor, SACBatch
+from rebody.control.step_predictor import LOWEST_REWARD, MOST_STEPS, step_reward, steps_of
 from rebody.control.tracker import Command, Tracker, of_slot, relative, tracker_observation
 from rebody.tasks import achieved
-from rebody.training.step_predictor.choosers import Chooser
 from rebody.training.step_predictor.config import StepPredictorConfig
 from rebody.training.tracker.commands import CommandDistribution, ToyGuide
 from rebody.types import AnyArray, GlobalState, Subgoal, Task
+
+Chooser = Callable[[Float[AnyArray, "robot feature"], PRNGKeyArray], Float[AnyArray, "robot 1"]]
+"""(what a predictor sees, random key) -> action in [-1, 1] of each robot, see `steps_of`."""
+
+
+class Exploring(eqx.Module):
+    """Samples its actor: for training."""
+
+    actor: Actor
+
+    def __call__(self, observation, key):
+        """A sample."""
+        return self.actor.sample(observation, key)[0]
+
+
+class Deciding(eqx.Module):
+    """Takes its actor's most likely action: as it will be used."""
+
+    actor: Actor
+
+    def __call__(self, observation, key):
+        """Nothing is left to chance."""
+        return self.actor(observation)
+
+
+class Fixed(eqx.Module):
+    """Always says the same: a fixed stride, to compare with."""
+
+    steps: Int[AnyArray, ""]
+
+    def __call__(self, observation, key):
+        """The middle of that number's share of actions."""
+        return jnp.full((len(observation), 1), 2 * (self.steps - 0.5) / MOST_STEPS - 1)
 
 
 class Chase(eqx.Module):

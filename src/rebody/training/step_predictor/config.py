@@ -4,23 +4,20 @@ from dataclasses import dataclass, field
 
 from rebody.control.sac import SACConfig
 from rebody.ranges import Copies, Count, Number, Rows, Share
+from rebody.training.off_policy import OffPolicyConfig
 from rebody.training.tracker.commands import CommandDistribution
 
 
-@dataclass(frozen=True)
-class StepPredictorConfig:
-    """One training run of a step predictor."""
+@dataclass(frozen=True, kw_only=True)
+class StepPredictorConfig(OffPolicyConfig):
+    """One training run of a step predictor; `held_out` is the number of robots of a measurement."""
 
-    robots: Copies = 64
-    """Copies that move in parallel."""
     steps: Copies = 64
     """Control steps of each robot in an iteration; at least as many as a subgoal can last, 20."""
     updates: Count = 128
     """Updates in an iteration."""
     iterations: Number = 60
     """Length of the run."""
-    evaluate_every: Count = 50
-    """Iterations from one measurement on held-out commands to the next."""
     replay: Rows = 200_000
     """Transitions kept; one is a subgoal, however long it was held."""
     change_probability: Share = 0.05

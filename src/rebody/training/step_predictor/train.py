@@ -4,43 +4,34 @@ A step of its decision process is a subgoal: the predictor says how many control
 follows it for so long, then the next one is given. Every robot has its own number of steps left.
 """
 
-from dataclasses import asdict
+from dataclasses import dataclass
 from pathlib import Path
 
-import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int, PRNGKeyArray
+from jaxtyping import PRNGKeyArray
 
 from rebody.agents.build import check_robot_of
+from rebody.agents.configs import StepPredictorSettings
 from rebody.agents.parts import LoadedTracker, load_step_predictor, load_tracker
-from rebody.bodies import RobotBatch, load_robot
-from rebody.bodies.check import require_ready
-from rebody.control import sac
-from rebody.control.sac import SACBatch, SACState
-from rebody.control.step_predictor import MOST_STEPS, StepPredictor, steps_of
-from rebody.control.tracker import Command, Tracker, tracker_observation
+from rebody.bodies import RobotBatch, RobotSpec
+from rebody.control.sac import Actor, SACBatch
+from rebody.control.step_predictor import MOST_STEPS, SLOTS, STEP_COST, StepPredictor, steps_of
+from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
-from rebody.ranges import check_ranges
-from rebody.training.ring import draw, newest, write
+from rebody.store import tree_hash
+from rebody.tasks import FAMILIES
+from rebody.training.card import save
+from rebody.training.motion import tracker_features
+from rebody.training.off_policy import Learner, OffPolicyState, ready_robot, train
 from rebody.training.run import Metrics, Run
-from rebody.training.step_predictor.chase import World, advance, begin
-from rebody.training.step_predictor.choosers import Deciding, Exploring
+from rebody.training.step_predictor.chase import Chooser, Deciding, Exploring, Fixed, World, advance, begin
 from rebody.training.step_predictor.config import StepPredictorConfig
-from rebody.training.step_predictor.report import measure, save_step_predictor
-from rebody.training.transitions import learn, no_transitions
 
-
-class RunState(eqx.Module):
-    """Everything that a resumed run needs; host arrays are written in place."""
-
-    sac: SACState
-    replay: SACBatch  # a ring with a row per subgoal
-    written: Int[np.ndarray, ""]  # rows ever
-    world: World
-    physics: Float[np.ndarray, "robot state"]
-    iteration: Int[np.ndarray, ""]
+STRIDES = (1, 2, 5, 10)
+"""Fixed numbers of control steps that it is compared with."""
 
 
 @own_jax_settings()
@@ -60,93 +51,108 @@ def train_step_predictor(
     RebodyError if the robot is not ready, `out` holds another run, or robot, tracker and `init_from` do not fit;
     Interrupted on Ctrl-C.
     """
-    check_ranges(config)
+    spec = ready_robot(robot, config)
     if config.steps < MOST_STEPS:
         raise RebodyError(f"--steps must be at least {MOST_STEPS}: so long can a subgoal be held.")
-    spec = load_robot(robot)
-    require_ready(spec)
     loaded = load_tracker(f"tracker-{spec.name}" if tracker is None else tracker)
     check_robot_of(loaded, spec)
-    settings = {"robot": robot, "tracker": tracker, "seed": seed, "init_from": init_from}
-    with Run(out, asdict(config) | settings, resume=resume, finish=finish) as run:
-        batch = RobotBatch(spec, config.robots)
-        batch.reset(np.random.default_rng((seed, 1)))
-        state = run.restore(initial_state(config, batch, loaded.tracker, jax.random.key(seed), init_from))
-        batch.state = state.physics
-        state = run.loop(
-            state,
-            lambda state: iterate(state, batch, loaded.tracker, config, seed),
-            config.iterations,
-            "step predictor",
+    settings = {"robot": robot, "tracker": tracker, "seed": seed}
+    learner = StepPredictorLearner(spec, config, loaded)
+    return train(learner, out, settings, resume=resume, finish=finish, init_from=init_from)
+
+
+@dataclass(frozen=True)
+class StepPredictorLearner(Learner[World]):
+    """(joint state, subgoal) -> how many control steps it will take a frozen tracker."""
+
+    name = "step predictor"
+    config: StepPredictorConfig
+    tracker: LoadedTracker
+
+    def sizes(self, batch: RobotBatch) -> tuple[int, int]:
+        """Those that the tracker sees, and one number."""
+        return tracker_features(batch, self.tracker.tracker.reach), 1
+
+    def begin(self, batch: RobotBatch, actor: Actor, key: PRNGKeyArray) -> World:
+        """Robots with a first subgoal."""
+        return begin(batch, self.tracker.tracker.reach, Exploring(actor), self.config, key)
+
+    def collect(
+        self, state: OffPolicyState[World], batch: RobotBatch, rng: np.random.Generator, key: PRNGKeyArray
+    ) -> tuple[World, Metrics]:
+        """Control steps; what the subgoals that ended earned, how long they were held, how many ended in a fall."""
+        chooser, before = Exploring(state.sac.actor), int(state.replay.written)
+        for step in range(self.config.steps):
+            step_key = jax.random.fold_in(key, step)
+            ended = advance(state.world, batch, self.tracker.tracker, chooser, self.config, rng, step_key)
+            state.replay.append(ended)
+        seen: SACBatch = state.replay.newest(int(state.replay.written) - before)
+        return state.world, {
+            "reward": float(np.mean(seen.reward)),
+            "steps": float(np.mean(steps_of(seen.action))),
+            "falls": float(np.mean(seen.terminal)),
+        }
+
+    def measure(self, actor: Actor) -> dict[str, float]:
+        """What subgoals earn, falls."""
+        return measure(Deciding(actor), self.tracker.tracker, self.spec, self.config)
+
+    def save(self, actor: Actor, figures: dict[str, float], run: Run) -> Path:
+        """A step predictor's artifact; fixed strides are measured beside it."""
+        robot, tracker, config = self.spec.name, self.tracker, self.config
+        predictor = StepPredictor(actor, tracker.tracker.reach)
+        settings = StepPredictorSettings(
+            robot=robot,
+            tracker=tracker.name,
+            tracker_hash=tree_hash(tracker.tracker),
+            reach=predictor.reach,
+            observations=actor.observations,
+            hidden=config.sac.hidden,
+            projections=config.sac.projections,
+            training=run.training(config),
         )
-        return save_step_predictor(_predictor(state, loaded), loaded, spec, config, run, seed)
+        rows = {f"{name}, predicted": f"{value:.3f}" for name, value in figures.items()}
+        for stride in STRIDES:
+            fixed = measure(Fixed(jnp.asarray(stride)), tracker.tracker, self.spec, config)
+            rows |= {f"{name}, always {stride}": f"{fixed[name]:.3f}" for name in ("reward", "relative error")}
+        steps = run.iterations * config.steps * config.robots
+        what = (
+            f"How many control steps a subgoal will take '{robot}' and '{tracker.name}': (joint state, subgoal) -> 1 "
+            f"to {MOST_STEPS}. Trained on {steps:,} control steps with {run.iterations * config.updates:,} updates. "
+            f"The figures are means over the subgoals of {config.held_out} robots that chase toys one decision ahead "
+            f"for {config.held_out_s:g} s."
+        )
+        return save("step-predictor", settings, predictor, run, f"Step predictor: {robot}", what, rows)
+
+    def load_actor(self, artifact: str) -> Actor:
+        """That of a step predictor."""
+        return load_step_predictor(artifact).predictor.actor
 
 
-def iterate(
-    state: RunState, batch: RobotBatch, tracker: Tracker, config: StepPredictorConfig, seed: int
-) -> tuple[RunState, Metrics]:
-    """Move the robots, learn from the replay, now and then evaluate."""
-    iteration, written = int(state.iteration), int(state.written)
-    rng = np.random.default_rng((seed, 2, iteration))
-    collect_key, learn_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration))
-    collect(state, batch, tracker, config, rng, collect_key)
-    transitions = draw(state.replay, int(state.written), (config.updates, config.sac.batch_size), rng)
-    policy, metrics = learn(state.sac, transitions, learn_key, config.sac)
-    metrics |= experience(newest(state.replay, int(state.written), int(state.written) - written))
-    state = eqx.tree_at(
-        lambda s: (s.sac, s.physics, s.iteration),
-        state,
-        (policy, batch.state, state.iteration + 1),
-    )
-    if (iteration + 1) % config.evaluate_every == 0:
-        figures = measure(Deciding(state.sac.averaged_actor), tracker, batch.spec, config)
-        metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
-    return state, {name: float(value) for name, value in metrics.items()}
-
-
-def collect(
-    state: RunState,
-    batch: RobotBatch,
-    tracker: Tracker,
-    config: StepPredictorConfig,
-    rng: np.random.Generator,
-    key: PRNGKeyArray,
-) -> None:
-    """Move every robot by `config.steps` control steps; write the replay in place."""
-    chooser = Exploring(state.sac.actor)
-    for step in range(config.steps):
-        transitions = advance(state.world, batch, tracker, chooser, config, rng, jax.random.fold_in(key, step))
-        write(state.replay, int(state.written), transitions)
-        state.written[...] += len(transitions.reward)
-
-
-def experience(seen: SACBatch) -> Metrics:
-    """Of the newest subgoals: what they earned, how long they were held, how many ended in a fall."""
-    return {
-        "reward": float(np.mean(seen.reward)),
-        "steps": float(np.mean(steps_of(seen.action))),
-        "falls": float(np.mean(seen.terminal)),
+def measure(chooser: Chooser, tracker: Tracker, spec: RobotSpec, config: StepPredictorConfig) -> dict[str, float]:
+    """Means over the subgoals of held-out chases, the error relative to the subgoal; falls per minute of a robot."""
+    batch = RobotBatch(spec, config.held_out)
+    seen = chase(chooser, batch, tracker, config)
+    steps = np.asarray(steps_of(seen.action))
+    stood = seen.terminal == 0
+    figures = {
+        "reward": np.mean(seen.reward),
+        "relative error": np.mean((-seen.reward - STEP_COST * steps)[stood]),
+        "falls per minute": 60 * np.sum(seen.terminal) / (config.held_out * config.held_out_s),
     }
+    slots = seen.observation[:, batch.tracker_state().shape[-1] :]  # one-hot, then the values
+    for slot in SLOTS:
+        figures[f"control steps, {FAMILIES[slot].name}"] = np.mean(steps[slots[:, slot] == 1])
+    return {name: float(value) for name, value in figures.items()}
 
 
-def initial_state(
-    config: StepPredictorConfig, batch: RobotBatch, tracker: Tracker, key: PRNGKeyArray, init_from: str | None = None
-) -> RunState:
-    """Robots with a first subgoal, an empty replay, a fresh policy or that of an artifact."""
-    nothing = Command(np.zeros(batch.size, np.int32), np.zeros(batch.size, np.float32))
-    features = tracker_observation(batch.tracker_state(), nothing, tracker.reach).shape[-1]
-    policy = sac.initial_state(features, 1, config.sac, key)
-    if init_from is not None:
-        policy = sac.take_over(policy, load_step_predictor(init_from).predictor.actor, init_from)
-    return RunState(
-        sac=policy,
-        replay=no_transitions(config.replay, features, 1),
-        written=np.zeros((), np.int64),
-        world=begin(batch, tracker.reach, Exploring(policy.actor), config, key),
-        physics=batch.state,
-        iteration=np.zeros((), np.int64),
-    )
-
-
-def _predictor(state: RunState, loaded: LoadedTracker) -> StepPredictor:
-    return StepPredictor(state.sac.averaged_actor, loaded.tracker.reach)
+def chase(chooser: Chooser, batch: RobotBatch, tracker: Tracker, config: StepPredictorConfig) -> SACBatch:
+    """Every subgoal that ended while robots chased toys, from their rest pose on."""
+    rng, key = np.random.default_rng(2**31 - 1), jax.random.key(2**31 - 1)
+    batch.reset(rng)
+    world = begin(batch, tracker.reach, chooser, config, key)
+    ended = [
+        advance(world, batch, tracker, chooser, config, rng, jax.random.fold_in(key, step))
+        for step in range(round(config.held_out_s / batch.spec.control_dt))
+    ]
+    return jax.tree.map(lambda *leaves: np.concatenate(leaves), *ended)

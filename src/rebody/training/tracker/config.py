@@ -7,28 +7,21 @@ from rebody.bodies.robot import Reach
 from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
 from rebody.errors import RebodyError
-from rebody.ranges import Copies, Count, NotNegative, Number, Positive, Rows, Share
+from rebody.ranges import Copies, Count, NotNegative, Number, Positive, Seconds, Share
+from rebody.training.off_policy import OffPolicyConfig
 from rebody.training.tracker.commands import CommandDistribution
 
 
-@dataclass(frozen=True)
-class TrackerConfig:
+@dataclass(frozen=True, kw_only=True)
+class TrackerConfig(OffPolicyConfig):
     """One training run of a tracker."""
 
     reach: Reach
     """What is asked of the robot, but for a margin."""
-    robots: Copies = 64
-    """Copies that move in parallel."""
-    steps: Copies = 32
-    """Control steps of each robot in an iteration."""
-    updates: Count = 256
-    """Updates in an iteration."""
-    iterations: Number = 700
-    """Length of the run."""
     evaluate_every: Count = 100
     """Iterations from one measurement on held-out commands to the next."""
-    replay: Rows = 500_000
-    """Transitions kept."""
+    held_out_s: Seconds = 10.0
+    """Length of the episodes of a measurement [s]; `held_out` is the number of commands per slot."""
     relabelled: Share = 0.5
     """Share of a batch whose commands are drawn anew."""
     segment_s: tuple[Positive, Positive] = (1.0, 8.0)

@@ -1,7 +1,6 @@
 """What a tracker does that is told the truth, and the artifact that it leaves behind."""
 
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 
 import jax
@@ -14,42 +13,37 @@ from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.bodies.robot import Reach
 from rebody.control.tracker import Tracker
-from rebody.store import save_artifact
 from rebody.tasks import FAMILIES, GOAL, VELOCITY, family_index
-from rebody.tasks.figures import final_error
-from rebody.training.card import card
+from rebody.training.card import save
+from rebody.training.held_out import errors_of
+from rebody.training.motion import decision
 from rebody.training.run import Run
 from rebody.training.tracker.config import TrackerConfig
 from rebody.types import DECISION_DT, GlobalState, Subgoal, Task
 
-COMMANDS = 100
-"""Held-out commands per slot."""
-SECONDS = 10.0
 SLOWEST = 0.3
 """Speeds below this are not asked for [m/s]."""
 
 
-def measure(tracker: Tracker, spec: RobotSpec) -> dict[str, float]:
+def measure(tracker: Tracker, spec: RobotSpec, config: TrackerConfig) -> dict[str, float]:
     """Errors on held-out commands of each slot within reach, speed at a zero command, share that fell."""
-    rng, reach = np.random.default_rng(2**31 - 1), tracker.reach
+    rng, reach, size = np.random.default_rng(2**31 - 1), tracker.reach, config.held_out
     values = [
-        speeds_within(reach, COMMANDS, rng) if name == "velocity" else rng.uniform(*ends, COMMANDS)
+        speeds_within(reach, size, rng) if name == "velocity" else rng.uniform(*ends, size)
         for name, ends in reach.limits.items()
     ]
-    slot = np.repeat([family_index(name) for name in reach.limits], COMMANDS)
-    zeros = np.zeros(COMMANDS // 4)
+    slot = np.repeat([family_index(name) for name in reach.limits], size)
+    zeros = np.zeros(max(1, size // 4))
     command = Subgoal(
         np.concatenate([slot, np.full(len(zeros), GOAL), np.full(len(zeros), VELOCITY)]).astype(np.int32),
         np.concatenate([*values, zeros, zeros]).astype(np.float32),
     )
     controller = TrackerController(tracker)
-    states, fell = run_robots(spec, len(command.slot), lambda batch: follow(controller, batch, command))
-    errors = final_error(Task(command.slot, command.value), states)
-    figures = {}
-    for name in tracker.slots:
-        of_slot = errors[: len(slot)][slot == family_index(name)]
-        figures[f"{name} median"] = float(np.median(of_slot))
-        figures[f"{name} p95"] = float(np.percentile(of_slot, 95))
+    states, fell = run_robots(
+        spec, len(command.slot), lambda batch: follow(controller, batch, command), config.held_out_s
+    )
+    asked, moved = jax.tree.map(lambda leaf: leaf[..., : len(slot)], (Task(command.slot, command.value), states))
+    figures = errors_of(asked, moved)
     figures["zero speed"] = float(np.abs(states.vx[-10:, len(slot) :]).mean())  # in the last second
     return figures | {"fell": float(fell.mean())}
 
@@ -66,26 +60,20 @@ def speeds_within(reach: Reach, size: int, rng: np.random.Generator) -> Float[np
 
 
 def run_robots(
-    spec: RobotSpec, size: int, control_step: Callable[[RobotBatch], None]
+    spec: RobotSpec, size: int, control_step: Callable[[RobotBatch], None], seconds: float = 10.0
 ) -> tuple[GlobalState, Bool[np.ndarray, " robot"]]:
     """States after each decision, [decision, robot], and which robots fell, moved by whatever does a control step."""
     batch = RobotBatch(spec, size)
     batch.reset(np.random.default_rng(0))
-    states, fell = [], np.zeros(size, bool)
-    for _ in range(round(SECONDS / DECISION_DT)):
-        before = batch.qpos.copy()
-        for _ in range(spec.steps_per_decision):
-            control_step(batch)
-            fell |= batch.fallen
-        states.append(spec.observe(batch.qpos, before))
-    return jax.tree.map(lambda *leaves: np.stack(leaves), *states), fell
+    decisions = [decision(batch, lambda _: control_step(batch)) for _ in range(round(seconds / DECISION_DT))]
+    states, fell = zip(*decisions, strict=True)
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *states), np.any(fell, axis=0)
 
 
-def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: Run, seed: int) -> Path:
-    """Measure, write artifact and card."""
-    figures = measure(tracker, spec)
+def save_tracker(tracker: Tracker, figures: dict[str, float], spec: RobotSpec, config: TrackerConfig, run: Run) -> Path:
+    """Write artifact and card."""
     actor, reach = tracker.actor, tracker.reach
-    stored = TrackerSettings(
+    settings = TrackerSettings(
         robot=spec.name,
         control_dt=spec.control_dt,
         reach=reach,
@@ -93,9 +81,9 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
         actions=actor.actions,
         hidden=config.sac.hidden,
         projections=config.sac.projections,
-        training=asdict(config) | run.length | {"seed": seed, "wall_s": run.wall_s},
+        training=run.training(config),
     )
-    condition = f"{COMMANDS} held-out commands, {SECONDS:g} s"
+    condition = f"{config.held_out} held-out commands, {config.held_out_s:g} s"
     asked = {
         "goal": f"goals to +-{reach.distance:g} m",
         "velocity": f"speeds {_ends(reach.speed)} m/s beyond +-{SLOWEST:g}",
@@ -117,14 +105,7 @@ def save_tracker(tracker: Tracker, spec: RobotSpec, config: TrackerConfig, run: 
         f"Low-level policy of '{spec.name}' with the slots {', '.join(tracker.slots)}: (joint state, subgoal) -> "
         f"joint action. Trained on {steps:,} control steps with {updates:,} updates."
     )
-    return save_artifact(
-        run.out,
-        kind="tracker",
-        config=asdict(stored),
-        weights=tracker,
-        card=card(f"Tracker: {spec.name}", what, run, seed, rows),
-        log=run.log,
-    )
+    return save("tracker", settings, tracker, run, f"Tracker: {spec.name}", what, rows)
 
 
 def _ends(ends: tuple[float, float] | None) -> str:

@@ -4,54 +4,31 @@ Many robots follow changing orders; half of every batch is learned from under co
 given, since the reward of any command follows from how the robot moved.
 """
 
-from dataclasses import asdict
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int, PRNGKeyArray
+from jaxtyping import Bool, Float, PRNGKeyArray
 
 from rebody.agents.parts import load_tracker
-from rebody.bodies import RobotBatch, load_robot
-from rebody.bodies.check import require_ready
-from rebody.control import sac
+from rebody.bodies import RobotBatch
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.control.tracker import Command, Motion, Tracker, after, slots_of, tracker_observation, tracker_reward
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
-from rebody.ranges import check_ranges
-from rebody.training.motion import motion_of
-from rebody.training.ring import draw, newest, write
-from rebody.training.run import Metrics, Run
+from rebody.training.motion import LastDecision, motion_of, no_command, tracker_features
+from rebody.training.off_policy import Learner, OffPolicyState, learn, ready_robot, train
+from rebody.training.run import Run
 from rebody.training.tracker.commands import Share
 from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.orders import Orders, commands, follow_guides, no_orders, renew
 from rebody.training.tracker.report import measure, save_tracker
 from rebody.training.tracker.schedule import schedule, speed_share
 from rebody.types import AnyArray
-
-
-class Replay(eqx.Module):
-    """Transitions of control steps: a ring in host memory, written in place, or batches drawn from it."""
-
-    joints: Float[AnyArray, "*size joint"]
-    action: Float[AnyArray, "*size action"]
-    next_joints: Float[AnyArray, "*size joint"]
-    motion: Motion
-    command: Command  # before the step
-
-
-class RunState(eqx.Module):
-    """Everything that a resumed run needs; host arrays are written in place."""
-
-    sac: SACState
-    replay: Replay
-    orders: Orders
-    physics: Float[np.ndarray, "robot state"]
-    previous_qpos: Float[np.ndarray, "robot nq"]  # at the last decision
-    iteration: Int[np.ndarray, ""]
 
 
 @own_jax_settings()
@@ -70,75 +47,120 @@ def train_tracker(
     RebodyError if the robot is not ready, `out` holds another run, `init_from` has other sizes, or the robot has no
     such slot as the only one asked for; Interrupted on Ctrl-C.
     """
-    check_ranges(config)
-    spec = load_robot(robot)
-    require_ready(spec)
+    spec = ready_robot(robot, config)
     only, slots = config.commands.only, slots_of(config.reach)
     if only not in (None, *slots):
         raise RebodyError(f"'{spec.name}' is not trained for slot '{only}'; it has: {', '.join(slots)}.")
-    with Run(
-        out, asdict(config) | {"robot": robot, "seed": seed, "init_from": init_from}, resume=resume, finish=finish
-    ) as run:
-        batch = RobotBatch(spec, config.robots)
-        batch.reset(np.random.default_rng((seed, 1)))
-        state = run.restore(initial_state(config, batch, jax.random.key(seed), init_from))
-        batch.state = state.physics
-        state = run.loop(state, lambda state: iterate(state, batch, config, seed), config.iterations, "tracker")
-        return save_tracker(_tracker(state, config), spec, config, run, seed)
+    settings = {"robot": robot, "seed": seed}
+    return train(TrackerLearner(spec, config), out, settings, resume=resume, finish=finish, init_from=init_from)
 
 
-def iterate(state: RunState, batch: RobotBatch, config: TrackerConfig, seed: int) -> tuple[RunState, Metrics]:
-    """Move the robots, learn from the replay, now and then evaluate."""
-    iteration = int(state.iteration)
-    rng = np.random.default_rng((seed, 2, iteration))
-    collect_key, learn_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), iteration))
-    collect(state, batch, config, rng, collect_key)
-    written = (iteration + 1) * config.steps * config.robots
-    transitions = draw(state.replay, written, (config.updates, config.sac.batch_size), rng)
-    share = jnp.asarray(speed_share(config, iteration))  # a number would be compiled anew whenever it changes
-    policy, metrics = learn(state.sac, transitions, learn_key, config, batch.spec.control_dt, share)
-    metrics |= experience(newest(state.replay, written, config.steps * config.robots), config, batch.spec.control_dt)
-    state = eqx.tree_at(
-        lambda s: (s.sac, s.physics, s.iteration),
-        state,
-        (policy, batch.state, state.iteration + 1),
-    )
-    if (iteration + 1) % config.evaluate_every == 0:
-        figures = measure(_tracker(state, config), batch.spec)
-        metrics |= {f"evaluation/{name}": value for name, value in figures.items()}
-    return state, {name: float(value) for name, value in metrics.items()}
+class ControlSteps(eqx.Module):
+    """Transitions as the replay buffer holds them: the reward follows from the command, which may be another."""
+
+    joints: Float[AnyArray, "*size joint"]
+    action: Float[AnyArray, "*size action"]
+    next_joints: Float[AnyArray, "*size joint"]
+    motion: Motion
+    command: Command  # before the step
 
 
-def collect(
-    state: RunState, batch: RobotBatch, config: TrackerConfig, rng: np.random.Generator, key: PRNGKeyArray
-) -> None:
-    """Move every robot by `config.steps` control steps under its orders; write the replay in place."""
-    spec, orders = batch.spec, state.orders
-    lasting = schedule(config, int(state.iteration), spec.control_dt)
-    first_row = int(state.iteration) * config.steps * config.robots
-    for step in range(config.steps):
-        order_key, action_key = jax.random.split(jax.random.fold_in(key, step))
-        renew(orders, batch, config, lasting, rng, order_key)
-        if step % spec.steps_per_decision == 0:
-            follow_guides(orders, spec.observe(batch.qpos, state.previous_qpos), config)
-            state.previous_qpos[:] = batch.qpos
-        push(batch, config, rng)
-        joints, before, command = batch.tracker_state(), batch.qpos.copy(), commands(orders, batch)
-        action = np.asarray(_explore(state.sac.actor, joints, command, action_key, config))
-        batch.step(action)
-        seen = Replay(
-            joints=joints,
+class World(eqx.Module):
+    """What is known of the robots beside their physics."""
+
+    orders: Orders
+    last: LastDecision
+
+
+@dataclass(frozen=True)
+class TrackerLearner(Learner[World]):
+    """(joint state, command) -> joint action."""
+
+    name = "tracker"
+    config: TrackerConfig
+
+    def sizes(self, batch: RobotBatch) -> tuple[int, int]:
+        """Joint state and command, and the robot's actuators."""
+        return tracker_features(batch, self.config.reach), self.spec.model.nu
+
+    def row(self, batch: RobotBatch) -> ControlSteps:
+        """What happened, whatever was asked for."""
+        joints, moved = batch.tracker_state()[:1], np.zeros(1, np.float32)
+        action = np.zeros((1, self.spec.model.nu), np.float32)
+        motion = Motion(moved, moved, moved, moved, np.zeros(1, bool), moved)
+        return ControlSteps(joints, action, joints, motion, no_command(1))
+
+    def begin(self, batch: RobotBatch, actor: Actor, key: PRNGKeyArray) -> World:
+        """Robots without orders."""
+        return World(no_orders(batch.size), LastDecision.of(batch))
+
+    def collect(
+        self, state: OffPolicyState[World], batch: RobotBatch, rng: np.random.Generator, key: PRNGKeyArray
+    ) -> tuple[World, dict[str, Any]]:
+        """Control steps under orders; what they earned, and how often robots fell."""
+        config, spec, orders, last = self.config, self.spec, state.world.orders, state.world.last
+        lasting = schedule(config, int(state.iteration), spec.control_dt)
+        for step in range(config.steps):
+            order_key, action_key = jax.random.split(jax.random.fold_in(key, step))
+            renew(orders, batch, config, lasting, rng, order_key)
+            if step % spec.steps_per_decision == 0:
+                follow_guides(orders, last.next(batch), config)
+            push(batch, config, rng)
+            joints, before, command = batch.tracker_state(), batch.qpos.copy(), commands(orders, batch)
+            action = np.asarray(_explore(state.sac.actor, joints, command, action_key, config))
+            batch.step(action)
+            seen = ControlSteps(joints, action, batch.tracker_state(), motion_of(batch, before), command)
+            state.replay.append(seen)
+            begin_anew(state.world, batch, batch.fallen | (orders.age >= lasting.trajectory), rng)
+        newest = state.replay.newest(config.steps * config.robots)
+        return state.world, experience(newest, config, spec.control_dt)
+
+    def update(self, policy: SACState, drawn: Any, key: PRNGKeyArray, iteration: int) -> tuple[SACState, dict]:
+        """Half of every batch learns under commands that were never given."""
+        share = jnp.asarray(speed_share(self.config, iteration))  # a number would be compiled anew whenever it changes
+        return learn(policy, drawn, key, self.config.sac, Relabelling(self.config, self.spec.control_dt, share))
+
+    def measure(self, actor: Actor) -> dict[str, float]:
+        """Errors, falls."""
+        return measure(Tracker(actor, self.config.reach), self.spec, self.config)
+
+    def save(self, actor: Actor, figures: dict[str, float], run: Run) -> Path:
+        """A tracker's artifact."""
+        return save_tracker(Tracker(actor, self.config.reach), figures, self.spec, self.config, run)
+
+    def load_actor(self, artifact: str) -> Actor:
+        """That of a tracker."""
+        return load_tracker(artifact).tracker.actor
+
+
+class Relabelling(eqx.Module):
+    """Transitions with their own command or a new one, and the reward that it would have brought.
+
+    A command is taken to last: afterwards the same goal in the world is nearer, a speed is the same.
+    """
+
+    config: TrackerConfig
+    control_dt: float
+    speed_share: Share = 1.0
+
+    def __call__(self, steps: ControlSteps, key: PRNGKeyArray) -> SACBatch:
+        """A batch to learn from."""
+        config, motion, action, reach = self.config, steps.motion, steps.action, self.config.reach
+        size = len(motion.pitch)
+        fresh = config.commands.sample(key, motion.pitch - motion.turn, reach, self.speed_share)
+        renewed = jnp.arange(size) < config.relabelled * size
+        command = jax.tree.map(lambda new, old: jnp.where(renewed, new, old), fresh, steps.command)
+        return SACBatch(
+            observation=tracker_observation(steps.joints, command, reach),
             action=action,
-            next_joints=batch.tracker_state(),
-            motion=motion_of(batch, before),
-            command=command,
+            reward=tracker_reward(command, motion, self.control_dt, action, reach, config.reward),
+            next_observation=tracker_observation(steps.next_joints, after(command, motion), reach),
+            terminal=motion.fell.astype(jnp.float32),
         )
-        write(state.replay, first_row + step * config.robots, seen)
-        begin_anew(state, batch, batch.fallen | (orders.age >= lasting.trajectory), rng)
 
 
 @eqx.filter_jit
-def experience(seen: Replay, config: TrackerConfig, control_dt: float) -> dict[str, Float[AnyArray, ""]]:
+def experience(seen: ControlSteps, config: TrackerConfig, control_dt: float) -> dict[str, Float[AnyArray, ""]]:
     """What was earned per control step, and how long robots stayed on their feet (thesis, figure 6.12)."""
     reward = tracker_reward(seen.command, seen.motion, control_dt, seen.action, config.reach, config.reward)
     seconds = seen.motion.fell.size * control_dt
@@ -151,77 +173,12 @@ def push(batch: RobotBatch, config: TrackerConfig, rng: np.random.Generator) -> 
     batch.push(np.where(is_pushed, rng.uniform(-config.push, config.push, batch.size), 0.0))
 
 
-def begin_anew(state: RunState, batch: RobotBatch, who: Bool[np.ndarray, " robot"], rng: np.random.Generator) -> None:
+def begin_anew(world: World, batch: RobotBatch, who: Bool[np.ndarray, " robot"], rng: np.random.Generator) -> None:
     """Robots that have fallen, or moved for long enough, go back to their rest pose, and get a new order."""
     batch.reset(rng, who)
-    state.orders.steps_left[who] = 0
-    state.orders.age[who] = 0
-    state.previous_qpos[who] = batch.qpos[who]
-
-
-@eqx.filter_jit
-def learn(
-    policy: SACState, transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float, share: Share
-) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
-    """One update of soft actor-critic per batch."""
-
-    def batch_of(transitions: Replay, key: PRNGKeyArray) -> SACBatch:
-        return relabel(transitions, key, config, control_dt, share)
-
-    return sac.update_many(policy, batch_of, transitions, jax.random.split(key, config.updates), config.sac)
-
-
-def relabel(
-    transitions: Replay, key: PRNGKeyArray, config: TrackerConfig, control_dt: float, share: Share = 1.0
-) -> SACBatch:
-    """Transitions with their own command or a new one, and the reward that it would have brought.
-
-    A command is taken to last: afterwards the same goal in the world is nearer, a speed is the same.
-    """
-    motion, action, reach = transitions.motion, transitions.action, config.reach
-    size = len(motion.pitch)
-    fresh = config.commands.sample(key, motion.pitch - motion.turn, reach, share)
-    renewed = jnp.arange(size) < config.relabelled * size
-    command = jax.tree.map(lambda new, old: jnp.where(renewed, new, old), fresh, transitions.command)
-    return SACBatch(
-        observation=tracker_observation(transitions.joints, command, reach),
-        action=action,
-        reward=tracker_reward(command, motion, control_dt, action, reach, config.reward),
-        next_observation=tracker_observation(transitions.next_joints, after(command, motion), reach),
-        terminal=motion.fell.astype(jnp.float32),
-    )
-
-
-def initial_state(
-    config: TrackerConfig, batch: RobotBatch, key: PRNGKeyArray, init_from: str | None = None
-) -> RunState:
-    """Robots without orders, an empty replay, a fresh policy or that of an artifact."""
-    spec, rows = batch.spec, config.replay
-    joints = batch.tracker_state()
-    still = Command(np.zeros(len(joints), np.int32), np.zeros(len(joints), np.float32))
-    moved = np.zeros(rows, np.float32)
-    observed = tracker_observation(joints, still, config.reach).shape[-1]
-    policy = sac.initial_state(observed, spec.model.nu, config.sac, key)
-    if init_from is not None:
-        policy = sac.take_over(policy, load_tracker(init_from).tracker.actor, init_from)
-    return RunState(
-        sac=policy,
-        replay=Replay(
-            joints=np.zeros((rows, joints.shape[-1]), np.float32),
-            action=np.zeros((rows, spec.model.nu), np.float32),
-            next_joints=np.zeros((rows, joints.shape[-1]), np.float32),
-            motion=Motion(moved.copy(), moved.copy(), moved.copy(), moved.copy(), np.zeros(rows, bool), moved),
-            command=Command(np.zeros(rows, np.int32), np.zeros(rows, np.float32)),
-        ),
-        orders=no_orders(config.robots),
-        physics=batch.state,
-        previous_qpos=batch.qpos.copy(),
-        iteration=np.zeros((), np.int64),
-    )
-
-
-def _tracker(state: RunState, config: TrackerConfig) -> Tracker:
-    return Tracker(state.sac.averaged_actor, config.reach)
+    world.orders.steps_left[who] = 0
+    world.orders.age[who] = 0
+    world.last.restart(batch, who)
 
 
 @eqx.filter_jit

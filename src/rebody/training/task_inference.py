@@ -1,9 +1,8 @@
-"""Robots with a frozen module each that listens: what policies learn from that act by its beliefs."""
+"""Robots with a frozen module each that infers their task: what policies learn from that act by its beliefs."""
 
 from collections.abc import Mapping
 
 import equinox as eqx
-import numpy as np
 from jaxtyping import Float, PRNGKeyArray
 
 from rebody.agents.parts import Inference
@@ -14,13 +13,35 @@ from rebody.tasks import BaseTask, RewardForm, TaskDistribution, reward
 from rebody.types import AnyArray, Belief, GlobalState, Task, Transition
 
 
-class Minds(eqx.Module):
+class TaskInference(eqx.Module):
     """What each robot's frozen module remembers and believes, and the task that is hidden from it."""
 
     encoder: EncoderCarry
     belief: Belief
     state: GlobalState  # at the last decision
     task: Task
+
+
+def begin_inference(encoder: Encoder, state: GlobalState, task: Task) -> TaskInference:
+    """Nothing known yet."""
+    shape = task.family.shape
+    return TaskInference(encoder.initial(shape), encoder.prior(shape), state, task)
+
+
+def begin_tasks(batch: RobotBatch, module: Inference, key: PRNGKeyArray) -> TaskInference:
+    """Fresh hidden tasks for robots at rest, and nothing known about them."""
+    task = tasks_within(module, batch.spec.reach).sample(key, (batch.size,))
+    return begin_inference(module.parts.module.encoder, batch.spec.observe(batch.qpos, batch.qpos), task)
+
+
+@eqx.filter_jit
+def infer(
+    encoder: Encoder, known: TaskInference, now: GlobalState, form: RewardForm
+) -> tuple[TaskInference, Float[AnyArray, " robot"]]:
+    """What is known once every robot's module has heard of the decision that ended now, and its reward."""
+    earned = reward(known.task, now, form)
+    carry, belief = encoder.step(known.encoder, Transition(known.state, earned, now))
+    return TaskInference(carry, belief, now, known.task), earned
 
 
 def tasks_within(module: Inference, reach: Reach) -> TaskDistribution:
@@ -34,27 +55,3 @@ def tasks_within(module: Inference, reach: Reach) -> TaskDistribution:
 def within_reach(target_ranges: Mapping[str, tuple[float, float]], reach: Reach) -> TaskDistribution:
     """Tasks of families with these ranges, as far as the robot reaches."""
     return TaskDistribution(tuple(BaseTask(name, *reach.within(name, *ends)) for name, ends in target_ranges.items()))
-
-
-def new_minds(batch: RobotBatch, module: Inference, key: PRNGKeyArray) -> Minds:
-    """Fresh hidden tasks, and nothing known about them."""
-    encoder, shape = module.parts.module.encoder, (batch.size,)
-    task = tasks_within(module, batch.spec.reach).sample(key, shape)
-    return Minds(encoder.initial(shape), encoder.prior(shape), batch.spec.observe(batch.qpos, batch.qpos), task)
-
-
-@eqx.filter_jit
-def listen(
-    encoder: Encoder, minds: Minds, now: GlobalState, form: RewardForm
-) -> tuple[Minds, Float[AnyArray, " robot"]]:
-    """Every robot's module takes in the decision that ended now."""
-    earned = reward(minds.task, now, form)
-    carry, belief = encoder.step(minds.encoder, Transition(minds.state, earned, now))
-    return Minds(carry, belief, now, minds.task), earned
-
-
-def put_on_feet(batch: RobotBatch, rng: np.random.Generator) -> None:
-    """A robot that has fallen is put on its feet where it lies: episode and belief go on."""
-    fallen, x = batch.fallen, batch.x
-    batch.reset(rng, fallen)
-    batch.qpos[fallen, batch.spec.root_addresses[0]] = x[fallen]

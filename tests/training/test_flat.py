@@ -1,6 +1,7 @@
 """What a flat policy learns from: episodes of robots whose frozen module hears of a hidden task."""
 
-import equinox as eqx
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
@@ -8,8 +9,9 @@ import pytest
 from rebody.bodies import RobotBatch
 from rebody.control.sac import SACConfig
 from rebody.store import tree_hash
-from rebody.training.flat import FlatConfig
-from rebody.training.flat.train import collect, initial_state, put_on_feet
+from rebody.training.flat import FlatConfig, FlatLearner
+from rebody.training.motion import put_on_feet
+from rebody.training.off_policy import initial_state
 from rebody.types import Transition, global_state
 
 ROBOTS, STEPS, DECISIONS, TURNS = 3, 4, 5, 6
@@ -27,18 +29,18 @@ def config():
 
 @pytest.fixture(scope="module")
 def turns(cheetah, inference, config):
-    """The replay after six turns, and after each the minds and the mean reward of the task."""
+    """The replay after six turns, and after each what is known and the mean reward of the task."""
     batch = RobotBatch(cheetah, ROBOTS)
     batch.reset(np.random.default_rng(0))
-    state = initial_state(config, batch, inference, jax.random.key(0))
-    minds, rewards = [], []
+    learner = FlatLearner(cheetah, config, inference)
+    state = initial_state(learner, batch, jax.random.key(0))
+    known, rewards = [], []
     for i in range(TURNS):
-        mind, earned = collect(state, batch, inference, config, np.random.default_rng(i), jax.random.key(i))
-        minds.append(mind)
-        rewards.append(earned)
-        state.iteration[...] += 1
-        state = eqx.tree_at(lambda s: s.minds, state, mind)
-    return state.replay, minds, rewards
+        world, metrics = learner.collect(state, batch, np.random.default_rng(i), jax.random.key(i))
+        known.append(world.inference)
+        rewards.append(metrics["task_reward"])
+        state = replace(state, world=world, iteration=np.asarray(i + 1))
+    return state.replay.rows, known, rewards
 
 
 def by_step(rows):
@@ -46,22 +48,22 @@ def by_step(rows):
     return rows.reshape(TURNS * STEPS, ROBOTS, *rows.shape[1:])
 
 
-def targets(minds):
+def targets(known):
     """The hidden goal at each control step; episodes begin at control steps 0, 10 and 20."""
-    of_episode = [np.asarray(minds[i].task.target) for i in (1, 4, 5)]
+    of_episode = [np.asarray(known[i].task.target) for i in (1, 4, 5)]
     return np.repeat(of_episode, [EPISODE, EPISODE, TURNS * STEPS - 2 * EPISODE], axis=0)
 
 
 def test_episodes_keep_their_own_clock(turns):
-    """Whatever the turns: a new task and an empty mind every five decisions."""
-    _, minds, _ = turns
-    assert [int(mind.encoder.ticks) for mind in minds] == [2, 4, 1, 3, 5, 2]
-    tasks = [tree_hash(mind.task) for mind in minds]
+    """Whatever the turns: a new task and an empty memory every five decisions."""
+    _, known, _ = turns
+    assert [int(each.encoder.ticks) for each in known] == [2, 4, 1, 3, 5, 2]
+    tasks = [tree_hash(each.task) for each in known]
     assert tasks[0] == tasks[1]
     assert tasks[2] == tasks[3] == tasks[4]
     assert len(set(tasks)) == 3
-    for mind in minds:
-        assert (np.abs(mind.task.target) <= 10).all()
+    for each in known:
+        assert (np.abs(each.task.target) <= 10).all()
 
 
 def test_where_a_step_leaves_a_robot_its_next_one_begins(turns):
@@ -74,7 +76,7 @@ def test_where_a_step_leaves_a_robot_its_next_one_begins(turns):
 
 
 def test_a_belief_changes_when_a_decision_ends_and_is_the_encoders(turns, inference):
-    replay, minds, _ = turns
+    replay, known, _ = turns
     x = 10.0 * by_step(replay.next_observation)[..., JOINTS]
     believed = by_step(replay.next_observation)[..., JOINTS + 1 :]
     held = by_step(replay.observation)[..., JOINTS + 1 :]
@@ -84,7 +86,7 @@ def test_a_belief_changes_when_a_decision_ends_and_is_the_encoders(turns, infere
     last = slice(EPISODE + 1, 2 * EPISODE, 2)  # the second episode's decisions
     x = x[last].T
     before = np.concatenate([np.zeros_like(x[:, :1]), x[:, :-1]], axis=1)
-    earned = -np.abs(x - targets(minds)[EPISODE][:, None])
+    earned = -np.abs(x - targets(known)[EPISODE][:, None])
     heard = Transition(global_state(x=before), earned, global_state(x=x))
     beliefs = inference.parts.module.encoder.along(heard)
     features = np.concatenate([beliefs.mean, np.sqrt(beliefs.variance)], axis=-1)
@@ -92,26 +94,27 @@ def test_a_belief_changes_when_a_decision_ends_and_is_the_encoders(turns, infere
 
 
 def test_it_is_paid_as_a_tracker_that_is_told(turns):
-    replay, minds, _ = turns
+    replay, known, _ = turns
     later = 10.0 * by_step(replay.next_observation)[..., JOINTS]
     pitch, action = by_step(replay.next_observation)[..., 1], by_step(replay.action)
-    miss = np.abs(targets(minds) - later)
+    miss = np.abs(targets(known) - later)
     posture = 0.5 * (1 - np.cos(pitch)) + 0.02 * np.mean(action**2, axis=-1)
     np.testing.assert_allclose(by_step(replay.reward), 0.05 / (0.1 + miss) - 0.2 * miss - posture, atol=1e-4)
 
 
 def test_the_tasks_own_reward_is_reported(turns):
-    replay, minds, rewards = turns
+    replay, known, rewards = turns
     x = 10.0 * by_step(replay.next_observation)[..., JOINTS]
-    earned = -np.abs(x - targets(minds))[1::2].mean(axis=-1)
+    earned = -np.abs(x - targets(known))[1::2].mean(axis=-1)
     np.testing.assert_allclose(rewards, earned.reshape(TURNS, 2).mean(axis=-1), rtol=1e-4)
 
 
 def test_nothing_of_the_frozen_module_changes(cheetah, inference, config):
     before = tree_hash(inference.parts)
     batch = RobotBatch(cheetah, ROBOTS)
-    state = initial_state(config, batch, inference, jax.random.key(0))
-    collect(state, batch, inference, config, np.random.default_rng(0), jax.random.key(0))
+    learner = FlatLearner(cheetah, config, inference)
+    state = initial_state(learner, batch, jax.random.key(0))
+    learner.collect(state, batch, np.random.default_rng(0), jax.random.key(0))
     assert tree_hash(inference.parts) == before
 
 

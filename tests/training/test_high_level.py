@@ -1,18 +1,21 @@
 """What a robot's high-level policy learns from: decisions under a frozen module and a frozen tracker."""
 
-import equinox as eqx
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
 
 from rebody.agents.parts import LoadedTracker
+from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch
 from rebody.control.sac import SACConfig
 from rebody.control.slot_policy import subgoal_of
 from rebody.store import tree_hash
 from rebody.tasks import GOAL
-from rebody.training.high_level import HighLevelConfig
-from rebody.training.high_level.train import collect, freeze, hold, initial_state, observe, shaped
+from rebody.training.high_level import HighLevelConfig, HighLevelLearner, shaped
+from rebody.training.motion import decision
+from rebody.training.off_policy import initial_state
 from rebody.types import Subgoal
 
 ROBOTS, STEPS, DECISIONS, TURNS = 3, 4, 6, 3
@@ -27,51 +30,50 @@ def config():
 
 
 @pytest.fixture(scope="module")
-def frozen(inference, tracker, cheetah):
-    return freeze(inference, LoadedTracker("tiny", "cheetah", tracker), cheetah)
+def learner(inference, tracker, cheetah, config):
+    return HighLevelLearner(cheetah, config, inference, LoadedTracker("tiny", "cheetah", tracker))
 
 
 @pytest.fixture(scope="module")
-def begun(cheetah, config, frozen):
+def begun(cheetah, learner):
     """A function: -> robots and the state of a run that begins."""
 
     def begun():
         batch = RobotBatch(cheetah, ROBOTS)
         batch.reset(np.random.default_rng(0))
-        return batch, initial_state(config, batch, frozen, jax.random.key(0))
+        return batch, initial_state(learner, batch, jax.random.key(0))
 
     return begun
 
 
 @pytest.fixture(scope="module")
-def turns(begun, config, frozen):
-    """The replay after three turns, [decision, robot], and the minds and positions after each."""
+def turns(begun, learner):
+    """The replay after three turns, [decision, robot], and what is known and the metrics after each."""
     batch, state = begun()
-    minds, metrics = [], []
+    known, metrics = [], []
     for i in range(TURNS):
-        mind, measured = collect(state, batch, frozen, config, np.random.default_rng(i), jax.random.key(i))
-        minds.append(mind)
+        world, measured = learner.collect(state, batch, np.random.default_rng(i), jax.random.key(i))
+        known.append(world)
         metrics.append(measured)
-        state.iteration[...] += 1
-        state = eqx.tree_at(lambda s: s.minds, state, mind)
-    rows = jax.tree.map(lambda leaf: leaf.reshape(TURNS * STEPS, ROBOTS, *leaf.shape[1:]), state.replay)
-    return rows, minds, metrics
+        state = replace(state, world=world, iteration=np.asarray(i + 1))
+    rows = jax.tree.map(lambda leaf: leaf.reshape(TURNS * STEPS, ROBOTS, *leaf.shape[1:]), state.replay.rows)
+    return rows, known, metrics
 
 
 def test_episodes_keep_their_own_clock(turns):
-    """Whatever the turns: a new task and an empty mind every six decisions."""
-    replay, minds, _ = turns
-    assert [int(mind.encoder.ticks) for mind in minds] == [4, 2, 6]
-    assert tree_hash(minds[1].task) == tree_hash(minds[2].task) != tree_hash(minds[0].task)
+    """Whatever the turns: a new task and an empty memory every six decisions."""
+    replay, known, _ = turns
+    assert [int(each.encoder.ticks) for each in known] == [4, 2, 6]
+    assert tree_hash(known[1].task) == tree_hash(known[2].task) != tree_hash(known[0].task)
     goes_on = (replay.next_observation[:-1] == replay.observation[1:]).all(axis=(1, 2))
     np.testing.assert_array_equal(np.flatnonzero(~goes_on) + 1, [DECISIONS])
 
 
 def test_it_is_paid_by_the_task_alone(turns, config, inference):
     """With a pull on arrival that is a function of the reward."""
-    replay, minds, metrics = turns
+    replay, known, metrics = turns
     x = 10.0 * replay.next_observation[..., 0]  # the tiny module's policy sees x / 10 and vx / 3.5
-    target = np.stack([np.asarray(minds[i].task.target) for i in (0, 2)]).repeat(DECISIONS, axis=0)
+    target = np.stack([np.asarray(known[i].task.target) for i in (0, 2)]).repeat(DECISIONS, axis=0)
     earned = -np.abs(x - target)
     scaled = earned / inference.parts.module.encoder.reward_scale
     np.testing.assert_allclose(replay.reward, shaped(scaled, np.zeros(scaled.shape, bool), config), atol=1e-4)
@@ -93,32 +95,32 @@ def test_what_is_stored_is_pooled_and_was_done(turns):
     assert len(np.unique(replay.action)) == replay.action.size
 
 
-def test_a_subgoal_is_held_for_a_decision(begun, frozen):
+def test_a_subgoal_is_held_for_a_decision(begun, learner):
     """As long as the tracker alone would need for two control steps."""
     batch, _ = begun()
     twin, _ = begun()
     subgoal = Subgoal(np.full(ROBOTS, GOAL, np.int32), np.array([3.0, -3.0, 0.0], np.float32))
-    fell = hold(batch, frozen.controller, subgoal)
+    _, fell = decision(batch, lambda _: follow(learner.controller, batch, subgoal))
     for _ in range(2):
         joints, pitch = twin.tracker_state(), twin.spec.pitch(twin.qpos).astype(np.float32)
-        twin.step(np.asarray(frozen.controller(joints, twin.x.astype(np.float32), pitch, subgoal, None)))
+        twin.step(np.asarray(learner.controller(joints, twin.x.astype(np.float32), pitch, subgoal, None)))
     np.testing.assert_allclose(batch.qpos, twin.qpos, atol=1e-4)
     assert not fell.any()
 
 
-def test_a_policy_sees_what_the_toys_policy_sees(begun, inference, frozen):
+def test_a_policy_sees_what_the_toys_policy_sees(begun, inference, learner):
     batch, state = begun()
-    minds = state.minds
+    known = state.world
     view, interpret = inference.parts.high_level.view, inference.parts.module.decoder.interpret
-    np.testing.assert_allclose(observe(minds, inference), view(minds.state, interpret(minds.belief)), atol=1e-6)
+    np.testing.assert_allclose(learner.observe(known), view(known.state, interpret(known.belief)), atol=1e-6)
     pooled = np.array([[0.5], [-0.5], [0.1]], np.float32)
     np.testing.assert_allclose(
-        subgoal_of(pooled, minds.state, frozen.slots).value, batch.x + 5 * (pooled * np.abs(pooled))[:, 0], rtol=1e-4
+        subgoal_of(pooled, known.state, learner.slots).value, batch.x + 5 * (pooled * np.abs(pooled))[:, 0], rtol=1e-4
     )
 
 
-def test_nothing_that_is_frozen_changes(begun, config, inference, tracker, frozen):
+def test_nothing_that_is_frozen_changes(begun, inference, tracker, learner):
     before = tree_hash(inference.parts), tree_hash(tracker)
     batch, state = begun()
-    collect(state, batch, frozen, config, np.random.default_rng(0), jax.random.key(0))
+    learner.collect(state, batch, np.random.default_rng(0), jax.random.key(0))
     assert (tree_hash(inference.parts), tree_hash(tracker)) == before
