@@ -21,6 +21,7 @@ POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 RATE_FIELDS = ("vx", "vy", "vz", "roll_rate", "pitch_rate", "yaw_rate")
 GLOBAL_FIELDS = POSE_FIELDS + RATE_FIELDS
 ANGLES = ("roll", "pitch", "yaw")
+"""Two values of these differ by the shorter way round."""
 RATE_OF: dict[str, str] = dict(zip(RATE_FIELDS, POSE_FIELDS, strict=True))
 """Fields that are displacements over a decision, and what is displaced."""
 

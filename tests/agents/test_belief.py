@@ -14,7 +14,7 @@ from rebody.bodies.toys import MassDamper
 from rebody.errors import RebodyError
 from rebody.store.typed import typed
 from rebody.tasks import GOAL
-from rebody.types import Task
+from rebody.types import ANGLES, Task
 
 DECISIONS = 9
 
@@ -68,10 +68,11 @@ def test_a_velocity_that_is_left_out_is_the_displacement(position, rate, stored_
     assert np.abs(of_told.latent.mean).max() > 0
 
 
-def test_a_pitch_may_go_round(stored_config):
-    module = module_of(stored_config, "pitch", "pitch_rate")
-    wrapped, unwrapped = module.begin({"pitch": 3.1}), module.begin({"pitch": 3.1})
-    wrapped, unwrapped = wrapped.update({"pitch": 3.2 - 2 * np.pi}, -1.0), unwrapped.update({"pitch": 3.2}, -1.0)
+@pytest.mark.parametrize("angle", ANGLES)
+def test_an_angle_may_go_round(angle, stored_config):
+    module = module_of(stored_config, angle, f"{angle}_rate")
+    wrapped, unwrapped = module.begin({angle: 3.1}), module.begin({angle: 3.1})
+    wrapped, unwrapped = wrapped.update({angle: 3.2 - 2 * np.pi}, -1.0), unwrapped.update({angle: 3.2}, -1.0)
     np.testing.assert_allclose(wrapped.latent.mean, unwrapped.latent.mean, atol=1e-5)
 
 

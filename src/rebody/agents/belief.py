@@ -20,7 +20,7 @@ from rebody.inference.mixture.padded import MixturePrior
 from rebody.inference.probe import Probe
 from rebody.jax_settings import own_jax_settings
 from rebody.tasks import FAMILIES
-from rebody.types import DECISION_DT, GLOBAL_FIELDS, RATE_OF, AnyArray, Belief, GlobalState, Transition
+from rebody.types import ANGLES, DECISION_DT, GLOBAL_FIELDS, RATE_OF, AnyArray, Belief, GlobalState, Transition
 
 
 @dataclass(frozen=True)
@@ -130,8 +130,7 @@ def _global_state(fields: tuple[str, ...], given: Any, previous: GlobalState | N
     for field in fields:
         if field not in known:
             known[field] = _velocity(field, known, previous, where)
-    if "pitch" in known:
-        known["pitch"] = _wrapped(known["pitch"])
+    known |= {angle: _wrapped(known[angle]) for angle in ANGLES if angle in known}
     return GlobalState(**{field: np.asarray(known.get(field, 0.0), np.float32) for field in GLOBAL_FIELDS})
 
 
@@ -144,7 +143,7 @@ def _velocity(field: str, known: Mapping[str, float], previous: GlobalState | No
     if previous is None:
         return 0.0
     moved = known[position] - float(getattr(previous, position))
-    return (_wrapped(moved) if position == "pitch" else moved) / DECISION_DT
+    return (_wrapped(moved) if position in ANGLES else moved) / DECISION_DT
 
 
 def _wrapped(angle: float) -> float:

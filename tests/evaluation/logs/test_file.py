@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rebody.errors import RebodyError
-from rebody.evaluation.logs import Format, read_log
+from rebody.evaluation.logs import COLUMNS, Format, read_log
+from rebody.types import GLOBAL_FIELDS
 
 GOOD = "time_s,position_m,velocity_m_s,reward\n0,0,0,0\n0.1,0.1,1,-1\n0.2,0.2,1,-0.9\n0.3,0.3,1,-0.8\n"
 
@@ -141,3 +142,7 @@ def test_a_file_that_would_fill_the_memory(tmp_path):
         file.truncate(10**9)  # sparse: takes no space
     with pytest.raises(RebodyError, match="is larger than 500 MB"):
         read_log(tmp_path / "log.csv", ("x",))
+
+
+def test_every_field_that_a_module_may_see_has_a_column():
+    assert set(COLUMNS) == set(GLOBAL_FIELDS)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rebody.evaluation.logs import resample
+from rebody.types import ANGLES
 
 FIELDS = ("x", "vx")
 
@@ -53,8 +54,9 @@ def test_a_decision_without_a_sample_is_bridged(log):
     np.testing.assert_allclose(decisions.reward[1:3], -0.35)
 
 
-def test_a_pitch_goes_on_round(log):
+@pytest.mark.parametrize("angle", ANGLES)
+def test_an_angle_goes_on_round(angle, log):
     time = 0.05 * np.arange(41)
     wrapped = (2.0 * time + 3.0 + np.pi) % (2 * np.pi) - np.pi
-    decisions = resample(log(("pitch",), pitch_rad=wrapped), ("pitch",))
-    np.testing.assert_allclose(np.diff(decisions.fields["pitch"]), 0.2, atol=1e-9)
+    decisions = resample(log((angle,), **{f"{angle}_rad": wrapped}), (angle,))
+    np.testing.assert_allclose(np.diff(decisions.fields[angle]), 0.2, atol=1e-9)

@@ -19,11 +19,15 @@ COLUMNS = {
     "x": "position_m",
     "y": "position_y_m",
     "z": "position_z_m",
+    "roll": "roll_rad",
     "pitch": "pitch_rad",
+    "yaw": "yaw_rad",
     "vx": "velocity_m_s",
     "vy": "velocity_y_m_s",
     "vz": "velocity_z_m_s",
+    "roll_rate": "roll_rate_rad_s",
     "pitch_rate": "pitch_rate_rad_s",
+    "yaw_rate": "yaw_rate_rad_s",
 }
 """The column of each field of the global state."""
 LONGEST_BREAK_S = 3600.0

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from rebody.evaluation.logs.file import Log
 from rebody.evaluation.logs.ticks import heard, ticks_of
-from rebody.types import DECISION_DT, RATE_OF
+from rebody.types import ANGLES, DECISION_DT, RATE_OF
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Decisions:
 
     time_s: Float[np.ndarray, " decision_and_one"]
     fields: dict[str, Float[np.ndarray, " decision_and_one"]]
-    """Of the global state; a pitch is not wrapped. Within gaps of the log they are guesses."""
+    """Of the global state; angles are not wrapped. Within gaps of the log they are guesses."""
     reward: Float[np.ndarray, " decision"]
     """NaN where nothing was heard: a gap of the log reaches into the decision."""
 
@@ -44,7 +44,7 @@ def resample(log: Log, fields: tuple[str, ...]) -> Decisions:
 def at_ticks(log: Log, position: str, ticks: Float[np.ndarray, " tick"]) -> Float[np.ndarray, " tick"]:
     """A position between its samples [m, rad]."""
     samples = log.fields[position]
-    return np.interp(ticks, log.time_s, np.unwrap(samples) if position == "pitch" else samples)
+    return np.interp(ticks, log.time_s, np.unwrap(samples) if position in ANGLES else samples)
 
 
 def mean_logged(log: Log, rate: str, ticks: Float[np.ndarray, " tick"]) -> Float[np.ndarray, " decision"]:
