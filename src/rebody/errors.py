@@ -14,10 +14,9 @@ class RebodyError(Exception):
 def unknown(kind: str, name: object, known: Iterable[str], more: str = "") -> RebodyError:
     """What to raise for a name that there is not: the nearest, then all that are known, then `more`."""
     known = list(known)
-    plural = f"{kind[:-1]}ies" if kind.endswith("y") else f"{kind}s"
     guess = did_you_mean(str(name), known)
     listed = ", ".join([*known, more] if more else known)
-    return RebodyError(f"unknown {kind} '{name}'.{guess} {plural.capitalize()} are: {listed}.")
+    return RebodyError(f"unknown {kind} '{name}'.{guess} {kind.capitalize()}s are: {listed}.")
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -8,7 +8,7 @@ import gymnasium
 import msgspec
 
 from rebody.bodies.robot import Fall, Reach, RobotSpec
-from rebody.errors import RebodyError, did_you_mean
+from rebody.errors import RebodyError, unknown
 from rebody.names import ROBOTS, shipped_robots
 from rebody.store.files import TEXT, read_file
 
@@ -57,10 +57,7 @@ def load_robot(robot: str) -> RobotSpec:
         return _read(ROBOTS / f"{robot}.toml")
     if robot.endswith(".toml") or "/" in robot:
         return _read(Path(robot))
-    raise RebodyError(
-        f"unknown robot '{robot}'.{did_you_mean(robot, shipped_robots())} Robots are: {', '.join(shipped_robots())}, "
-        "or the path of a robot's TOML file."
-    )
+    raise unknown("robot", robot, shipped_robots(), "or the path of a robot's TOML file")
 
 
 def _read(path: Path) -> RobotSpec:

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float, PRNGKeyArray
 
-from rebody.errors import RebodyError
+from rebody.errors import unknown
 from rebody.ranges import NotNegative, Positive
 from rebody.types import DECISION_DT, AnyArray, GlobalState, global_state
 
@@ -268,7 +268,7 @@ TOYS: dict[str, type[Toy]] = {"mass-damper": MassDamper, "position": PositionToy
 def make_toy(kind: str, **settings: float) -> Toy:
     """A toy by its name in `TOYS`; RebodyError if there is none."""
     if kind not in TOYS:
-        raise RebodyError(f"unknown toy '{kind}'. Toys are: {', '.join(TOYS)}.")
+        raise unknown("toy", kind, TOYS)
     return TOYS[kind](**settings)
 
 
