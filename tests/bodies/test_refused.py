@@ -106,7 +106,10 @@ def test_nothing_else_is_trained_on_it(kind, write_own, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("mjcf", "says"),
     [
-        ([("<worldbody>", '<asset><mesh file="shell.stl"/></asset><worldbody>')], "shell.stl"),
+        (
+            [("<worldbody>", '<asset><mesh file="shell.stl"/></asset><worldbody><geom type="mesh" mesh="shell"/>')],
+            "shell.stl",
+        ),
         ([("<worldbody>", '<size memory="900G"/><worldbody>')], "Could not allocate memory"),
         ([("<mujoco>", "<mujoco>" + "<worldbody>" * 9000)], "nesting is too deep"),
         ([("<mujoco>", "<mujoco><!--" + 17_000_000 * "x" + "-->")], "own.xml is larger than 16 MB"),

@@ -52,7 +52,9 @@ def test_moves_bit_for_bit_as_gymnasiums(name, theirs, tmp_path, monkeypatch):
     kind = mujoco.mjtState.mjSTATE_INTEGRATION
     state = np.zeros(mujoco.mj_stateSize(env.model, kind))
     mujoco.mj_getState(env.model, env.data, state, kind)
-    batch.state = np.array([[*state, 0.0, 0.0]])  # it has not lain, and stood
+    fresh = batch.state  # it has not lain, and stood
+    fresh[0, : len(state)] = state
+    batch.state = fresh
     for action in actions_of(1, actuators=spec.model.nu):
         env.step(action[0])
         batch.step(action)

@@ -17,6 +17,7 @@ from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results
 from rebody.evaluation.evaluate import POINT_MASS, run_trial, take_yardsticks, trial_agent
+from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import no_mixture
 from rebody.store import tree_hash
 from rebody.store.typed import typed
@@ -281,6 +282,7 @@ def of_another_module(trial):
     return replace(trial.flat, inference_hash="0" * 64)
 
 
+SEES_YAW = Contract(("yaw",), 6, {"goal": (-9.0, 9.0)}, "plain")
 REFUSED = {
     "was trained on 'cheetah', not on 'hopper'": lambda trial: (
         replace(trial, robot=replace(load_robot("cheetah"), name="hopper")), SPECS,
@@ -312,8 +314,9 @@ REFUSED = {
         replace(trial, agent="oracle", robot=None, tracker=None, flat=None), [TaskSpec("velocity", 1.0)],
     ),
     "unknown agent 'resue'": lambda trial: (replace(trial, agent="resue"), SPECS),
-    "its encoder sees x, which 'cheetah' does not have": lambda trial: (
-        replace(trial, robot=replace(load_robot("cheetah"), moving_fields=("z",))), SPECS,
+    "its encoder sees yaw, which 'cheetah' does not have": lambda trial: (
+        replace(trial, inference=replace(trial.inference, contract=SEES_YAW)),
+        SPECS,
     ),
 }  # fmt: skip
 

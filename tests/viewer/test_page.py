@@ -148,9 +148,9 @@ def test_orders_are_carried_out(looked_at):
         orders.put(TaskSpec("goal", 0.0))
         orders.put(Restart())
         wait_for(lambda: page.session.task.family == "goal", "the task")
-        before = page.session.body.qpos[0]
+        before = page.session.x
         orders.put(Push(1.0))
-        wait_for(lambda: page.session.body.qpos[0] > before + 0.05, "the push")
+        wait_for(lambda: page.session.x > before + 0.05, "the push")
 
 
 def test_what_does_not_fit_is_said_and_all_goes_on(looked_at):

@@ -87,7 +87,7 @@ def test_a_push_changes_the_velocity(fresh):
         fresh.restart()
         fresh.push(push)
         fresh.step()
-        return fresh.pose[fresh.body.x_address]
+        return fresh.x
 
     assert moved(0.5) - moved(0.0) == pytest.approx(0.5 * fresh.step_s, rel=0.35)
 
@@ -97,7 +97,7 @@ def test_a_restart_forgets_all_but_the_task(fresh):
     decide(fresh, 3)
     before = [moment.reward for moment in fresh.moments]
     fresh.restart()
-    assert (fresh.time_s, fresh.pose[fresh.body.x_address], len(fresh.moments)) == (0.0, 0.0, 0)
+    assert (fresh.time_s, fresh.x, len(fresh.moments)) == (0.0, 0.0, 0)
     decide(fresh, 3)
     assert [moment.reward for moment in fresh.moments] == before
     assert fresh.task == OTHER

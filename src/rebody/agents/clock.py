@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from rebody.agents.agent import Agent, Carry, Command, Observation
-from rebody.bodies import RobotBatch
+from rebody.bodies import Simulation
 from rebody.control.step_predictor import StepPredictor
 from rebody.control.tracker import relative
 from rebody.types import AnyArray, GlobalState, Subgoal
@@ -29,7 +29,7 @@ class Clock(eqx.Module):
         """A decision of the episodes that are due."""
 
     @abstractmethod
-    def steps(self, batch: RobotBatch, subgoal: Subgoal) -> Int[np.ndarray, " episode"]:
+    def steps(self, body: Simulation, subgoal: Subgoal) -> Int[np.ndarray, " episode"]:
         """Control steps to the next decision of an episode that decided on that subgoal just now."""
 
 
@@ -46,9 +46,9 @@ class EvenClock(Clock):
         """`Agent.decide`: all are due."""
         return decide(agent, carry, observation)
 
-    def steps(self, batch, subgoal):
+    def steps(self, body, subgoal):
         """Always the same."""
-        return np.full(batch.size, self.every)
+        return np.full(body.size, self.every)
 
 
 class PredictedClock(Clock):
@@ -64,14 +64,15 @@ class PredictedClock(Clock):
         """Those that are not due keep memory and command."""
         return _decide_each(agent, carry, observation, due)
 
-    def steps(self, batch, subgoal):
+    def steps(self, body, subgoal):
         """What the predictor says."""
-        return np.asarray(_predict(self.predictor, batch.tracker_state(), *place(batch), subgoal))
+        return np.asarray(_predict(self.predictor, body.proprioception(), *place(body), subgoal))
 
 
-def place(batch: RobotBatch) -> tuple[Float[np.ndarray, " robot"], Float[np.ndarray, " robot"]]:
+def place(body: Simulation) -> tuple[Float[np.ndarray, " robot"], Float[np.ndarray, " robot"]]:
     """x [m] and pitch [rad] of each robot."""
-    return batch.x.astype(np.float32), batch.spec.pitch(batch.qpos).astype(np.float32)
+    x, _, _, _, pitch, _ = body.pose().T.astype(np.float32)
+    return x, pitch
 
 
 @eqx.filter_jit

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from rebody.bodies import RobotBatch
+from rebody.bodies import Simulation
 from rebody.control.flat import FlatPolicy
 from rebody.control.tracker import Command, Tracker, relative
 from rebody.inference.decoder import Decoder
@@ -20,7 +20,7 @@ class Controller(eqx.Module):
     """(what it sees of the body, x, pitch, subgoal, belief) -> joint action; each kind looks at what it needs."""
 
     @abstractmethod
-    def see(self, batch: RobotBatch) -> Float[np.ndarray, "robot joint"]:
+    def see(self, body: Simulation) -> Float[np.ndarray, "robot joint"]:
         """What it sees of each robot's body."""
 
     @abstractmethod
@@ -42,9 +42,9 @@ class TrackerController(Controller):
     goal_ahead: float = eqx.field(static=True, default=math.inf)
     """Farthest that a goal is shown ahead [m], see `RobotSpec.goal_ahead`."""
 
-    def see(self, batch):
+    def see(self, body):
         """The joint state, and the pace where there is one."""
-        return batch.tracker_state()
+        return body.proprioception()
 
     def __call__(self, joints, x, pitch, subgoal, belief):
         """A goal is made relative to where the robot is now."""
@@ -59,9 +59,9 @@ class FlatController(Controller):
     policy: FlatPolicy
     decoder: Decoder
 
-    def see(self, batch):
+    def see(self, body):
         """The joint state."""
-        return batch.joint_state()
+        return body.joint_state()
 
     def __call__(self, joints, x, pitch, subgoal, belief):
         """There is no subgoal."""

@@ -1,6 +1,5 @@
 """Episodes of an agent on a toy (one compiled scan) and on robots (a loop on the host)."""
 
-from collections import deque
 from collections.abc import Callable, Sequence
 
 import equinox as eqx
@@ -12,14 +11,14 @@ from jaxtyping import Bool, Float, Int
 from rebody.agents.agent import Agent, Observation
 from rebody.agents.clock import Clock, EvenClock, place
 from rebody.agents.controller import Controller
-from rebody.bodies import RobotBatch, RobotSpec
+from rebody.bodies import RobotBatch, RobotSpec, Simulation
 from rebody.bodies.toys import Disturbance, Toy
 from rebody.tasks import RewardForm, reward
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task
 
 Starts = Sequence[int] | Int[np.ndarray, " episode"]
 """What the reset noise of each episode is drawn from."""
-OnFrame = Callable[[RobotBatch, Subgoal], None]
+OnFrame = Callable[[Simulation, Subgoal], None]
 
 
 class Episodes(eqx.Module):
@@ -55,6 +54,47 @@ def rollout_on_toy(
     return Episodes(state, earned, belief, subgoal, still > 0)
 
 
+class Drive:
+    """Bodies that move as an agent says, a step at a time: the one loop on the host."""
+
+    def __init__(
+        self,
+        agent: Agent,
+        controller: Controller | None,
+        body: Simulation,
+        form: RewardForm,
+        clock: Clock | None = None,
+    ):
+        """Without a controller the agent's own action moves them, as on a point mass.
+
+        The clock says when the agent decides (thesis mode, 6.3.3); default is every 0.1 s.
+        """
+        self.agent, self.steps = agent, 0
+        self._controller, self._body = controller, body
+        self._form: RewardForm = form
+        self._clock = clock or EvenClock(body.steps_per_decision)
+        self.carry, self.command = self._clock.begin(agent, body.observe())
+        self._steps_left = self._clock.steps(body, self.command.subgoal)
+
+    def step(self, task: Task) -> Observation | None:
+        """One step of the bodies and the decisions that are due then; what there is to hear, at least every 0.1 s."""
+        body, held = self._body, self.command
+        if self._controller is None:
+            body.step(np.asarray(held.action))
+        else:
+            follow(self._controller, body, held.subgoal, self.carry.belief)
+        self.steps, self._steps_left = self.steps + 1, self._steps_left - 1
+        due = self._steps_left == 0
+        if not due.any() and self.steps % body.steps_per_decision:
+            return None
+        state = body.observe()
+        heard = Observation(state, task_reward(task, state, self._form))
+        if due.any():
+            self.carry, self.command = self._clock.decide(self.agent, self.carry, heard, due)
+            self._steps_left = np.where(due, self._clock.steps(body, self.command.subgoal), self._steps_left)
+        return heard
+
+
 def rollout_on_robot(
     agent: Agent,
     controller: Controller,
@@ -69,45 +109,30 @@ def rollout_on_robot(
     episode is drawn from its number in `starts`.
 
     Nothing ends early: a fallen robot lies there and keeps scoring. `on_frame` is called at every control step.
-    The clock says when the agent decides (thesis mode, 6.3.3); default is every 0.1 s. What is returned stays 0.1 s
-    apart.
+    What is returned is 0.1 s apart, whatever the clock.
     """
     decisions, size = tasks.target.shape
-    per_decision = spec.steps_per_decision
-    batch = RobotBatch(spec, size)
+    body = RobotBatch(spec, size)
     for episode, seed in enumerate(starts):
-        batch.reset(np.random.default_rng(seed), np.arange(size) == episode)
-    trail = deque([batch.qpos.copy()], maxlen=per_decision + 1)  # over the last 0.1 s
-    clock = clock or EvenClock(per_decision)
-    carry, command = clock.begin(agent, spec.observe(batch.qpos, trail[0]))
-    steps_left = clock.steps(batch, command.subgoal)
+        body.reset(np.random.default_rng(seed), np.arange(size) == episode)
+    drive = Drive(agent, controller, body, form, clock)
     fell, records = np.zeros(size, bool), []
-    for step in range(1, decisions * per_decision + 1):
-        held = command.subgoal
-        follow(controller, batch, held, carry.belief)
-        fell |= batch.fallen
+    for step in range(decisions * body.steps_per_decision):
+        i, of_decision = divmod(step, body.steps_per_decision)
+        held = drive.command.subgoal
+        heard = drive.step(Task(tasks.family[i], tasks.target[i]))
+        fell |= body.fallen
         if on_frame is not None:
-            on_frame(batch, held)
-        trail.append(batch.qpos.copy())
-        steps_left = steps_left - 1
-        due, is_recorded = steps_left == 0, step % per_decision == 0
-        if not (due.any() or is_recorded):
-            continue
-        state = spec.observe(batch.qpos, trail[0])
-        i = (step - 1) // per_decision
-        earned = task_reward(Task(tasks.family[i], tasks.target[i]), state, form)
-        if due.any():
-            carry, command = clock.decide(agent, carry, Observation(state, earned), due)
-            steps_left = np.where(due, clock.steps(batch, command.subgoal), steps_left)
-        if is_recorded:
-            records.append((state, earned, carry.belief, held))
+            on_frame(body, held)
+        if heard is not None and of_decision == body.steps_per_decision - 1:
+            records.append((heard.state, heard.reward, drive.carry.belief, held))
     state, earned, belief, subgoal = jax.tree.map(lambda *steps: np.stack(steps), *records)
     return Episodes(state, earned, belief, subgoal, fell)
 
 
-def follow(controller: Controller, batch: RobotBatch, subgoal: Subgoal, belief: Belief | None = None) -> None:
+def follow(controller: Controller, body: Simulation, subgoal: Subgoal, belief: Belief | None = None) -> None:
     """One control step of every robot."""
-    batch.step(np.asarray(joint_action(controller, controller.see(batch), *place(batch), subgoal, belief)))
+    body.step(np.asarray(joint_action(controller, controller.see(body), *place(body), subgoal, belief)))
 
 
 @eqx.filter_jit

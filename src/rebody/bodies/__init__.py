@@ -2,6 +2,8 @@
 
 from rebody.bodies.batch import RobotBatch
 from rebody.bodies.description import load_robot, shipped_robots
+from rebody.bodies.point_masses import PointMasses
 from rebody.bodies.robot import RobotSpec
+from rebody.bodies.simulation import Simulation
 
-__all__ = ["RobotBatch", "RobotSpec", "load_robot", "shipped_robots"]
+__all__ = ["PointMasses", "RobotBatch", "RobotSpec", "Simulation", "load_robot", "shipped_robots"]

@@ -14,6 +14,7 @@ from rebody.bodies.check_model import Finding, check_model
 from rebody.bodies.model import NOT_USED, carried_by
 from rebody.bodies.robot import RobotSpec
 from rebody.errors import RebodyError
+from rebody.types import GLOBAL_FIELDS
 
 SECONDS = 5.0
 """How long it is run."""
@@ -66,7 +67,7 @@ def _run(spec: RobotSpec, amplitude: float) -> tuple[bool, str]:
         batch.step(rng.uniform(-amplitude, amplitude, (batch.size, spec.model.nu)))
         if fell_at is None and batch.fallen.any():
             fell_at = (step + 1) * spec.control_dt
-    if not _is_sound(batch.qpos):
+    if not _is_sound(batch.picture_pose()):
         return False, "positions run away: lower the time step"
     fall = "no copy fell" if fell_at is None else f"first of {batch.size} copies fallen after {fell_at:.2g} s"
     return True, f"{SECONDS:g} s, {fall}"
@@ -99,31 +100,36 @@ def _touched(spec: RobotSpec, data: mujoco.MjData) -> str | None:
     return None
 
 
-def _pushed_forward(spec: RobotSpec) -> tuple[bool, str]:
-    """A push forward shows in the global state as it should."""
+def _pushed(spec: RobotSpec) -> tuple[bool, str]:
+    """A push shows in the global state as it should: forward, and sideways where it can move so."""
+    ways = {"forward": "vx", "sideways": "vy"}
+    speeds = {way: _speed(spec, i, field) for i, (way, field) in enumerate(ways.items()) if field in spec.moving_fields}
+    says = ", ".join(f"{way} it reads {speed:.2f} m/s" for way, speed in speeds.items())
+    return min(speeds.values()) > 0, f"pushed by 1 m/s {says} over the first decision"
+
+
+def _speed(spec: RobotSpec, axis: int, field: str) -> float:
+    """What a push along an axis reads as [m/s]."""
     batch = RobotBatch(spec, 1, threads=1)
     batch.reset(np.random.default_rng(0))
-    before = batch.qpos.copy()
-    batch.push(np.ones(1))
+    batch.push(np.eye(2)[[axis]])
     for _ in range(spec.steps_per_decision):
         batch.step(np.zeros((1, spec.model.nu)))
-    speed = float(spec.observe(batch.qpos, before).vx[0])
-    return speed > 0, f"pushed by 1 m/s, it reads {speed:.2f} m/s over the first decision"
+    return float(getattr(batch.observe(), field)[0])
 
 
 def _trained(spec: RobotSpec) -> tuple[bool, str]:
     """All that training calls: what is read is finite, and a saved state continues to the last bit, as does a reset."""
     rng, batch, twin = np.random.default_rng(0), RobotBatch(spec, COPIES, 1), RobotBatch(spec, COPIES, 1)
     batch.reset(rng)
-    before, actions = batch.qpos.copy(), rng.uniform(-1, 1, (2, spec.steps_per_decision, COPIES, spec.model.nu))
+    actions = rng.uniform(-1, 1, (2, spec.steps_per_decision, COPIES, spec.model.nu))
     batch.push(rng.uniform(-1, 1, COPIES))
     _act(batch, actions[0])
     twin.state = batch.state
     if not np.array_equal(_act(batch, actions[1]), _act(twin, actions[1])):
         return False, "a state that was saved does not continue as it did: the model keeps some of it elsewhere"
-    seen = spec.observe(batch.qpos, before)
-    read = (batch.tracker_state(), batch.joint_state(), batch.pace, seen.x, seen.z, seen.pitch, seen.vx, seen.vz)
-    if not all(np.isfinite(numbers).all() for numbers in (*read, seen.pitch_rate)):
+    read = (batch.proprioception(), batch.joint_state(), batch.observe().select(GLOBAL_FIELDS))
+    if not all(np.isfinite(numbers).all() for numbers in read):
         return False, "what is read of it is not finite"
     batch.reset(np.random.default_rng(1))
     twin = RobotBatch(spec, COPIES, 1)
@@ -140,4 +146,4 @@ def _act(batch: RobotBatch, actions: Float[np.ndarray, "step robot nu"]) -> Floa
     return batch.state
 
 
-_IN_USE: dict[str, Look] = {"floor": _floor, "readout": _pushed_forward, "training": _trained}
+_IN_USE: dict[str, Look] = {"floor": _floor, "readout": _pushed, "training": _trained}

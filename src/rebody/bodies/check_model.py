@@ -31,10 +31,22 @@ def check_model(spec: RobotSpec) -> list[Finding]:
 
     RebodyError if the model cannot be loaded, or the description names a joint of the rest pose that it does not have.
     """
-    findings = [_control_step(spec), *_root(spec)]
+    findings = [*_left_out(spec), _control_step(spec), *(_free(spec) if spec.floats_freely else _root(spec))]
     if not all(finding.is_right for finding in findings):
         return findings  # the others would fail for the same reasons
-    return [*findings, _moves_whole(spec), _actuators(spec), _rest_pose(spec)]
+    whole = [] if spec.floats_freely else [_moves_whole(spec)]
+    return [*findings, *whole, _actuators(spec), _rest_pose(spec)]
+
+
+def _left_out(spec: RobotSpec) -> list[Finding]:
+    files = spec.compiled.left_out
+    says = f"left out of the picture, since they are not there: {', '.join(files)}"
+    return [Finding("files", True, says)] if files else []
+
+
+def _free(spec: RobotSpec) -> list[Finding]:
+    """A free joint moves a body whole."""
+    return [Finding("root body", True, f"'{spec.root}', floats freely in space")]
 
 
 def _control_step(spec: RobotSpec) -> Finding:

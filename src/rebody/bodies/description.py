@@ -7,6 +7,7 @@ from pathlib import Path
 import gymnasium
 import msgspec
 
+from rebody.bodies.model import Space
 from rebody.bodies.robot import Fall, Reach, RobotSpec
 from rebody.errors import RebodyError, unknown
 from rebody.names import ROBOTS, shipped_robots
@@ -21,11 +22,13 @@ class _Root(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     z: str | None = None
     pitch: str | None = None
     body: str | None = None
+    space: Space = "plane"
 
 
 class _Fall(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     min_height: float = Fall.min_height
     max_pitch: float = Fall.max_pitch
+    min_up: float = Fall.min_up
     lasts_s: float = Fall.lasts_s
 
 
@@ -44,6 +47,7 @@ class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     root: _Root
     fall: _Fall
     reach: _Reach
+    keyframe: str | None = None
     rest: dict[str, float] = {}
     timestep: float | None = None
     reset_noise: float = 0.01
@@ -75,6 +79,8 @@ def _read(path: Path) -> RobotSpec:
         mjcf=_mjcf(description.mjcf, path),
         frame_skip=description.frame_skip,
         root=_root(description.root, path),
+        space=description.root.space,
+        keyframe=description.keyframe,
         timestep=description.timestep,
         rest=tuple(description.rest.items()),
         reset_noise=description.reset_noise,
@@ -97,10 +103,11 @@ def _root(root: _Root, path: Path) -> tuple[str, str, str] | str:
     joints = (root.x, root.z, root.pitch)
     if root.body is not None and joints == (None, None, None):
         return root.body
-    if root.body is None and root.x and root.z and root.pitch:
+    if root.body is None and root.x and root.z and root.pitch and root.space == "plane":
         return root.x, root.z, root.pitch
     raise RebodyError(
-        f"'{path}': [root] names either the joints that carry x, z and pitch, or the body that floats freely."
+        f"'{path}': [root] names either the joints that carry x, z and pitch, or the body that floats freely, which "
+        'alone may have space = "free".'
     )
 
 
@@ -131,8 +138,8 @@ def _check_values(spec: RobotSpec, path: Path) -> None:
         problems.append("smoothing_s must not be negative")
     if not spec.goal_ahead > 0:
         problems.append("goal_ahead must be positive")
-    if not spec.fall.max_pitch > 0 or not spec.fall.lasts_s >= 0:
-        problems.append("[fall] max_pitch must be positive, lasts_s not negative")
+    if not spec.fall.max_pitch > 0 or not spec.fall.lasts_s >= 0 or not spec.fall.min_up < 1:
+        problems.append("[fall] max_pitch must be positive, lasts_s not negative, min_up less than 1")
     problems += [f"[reach] {problem}" for problem in reach_problems(spec.reach)]
     if problems:
         raise RebodyError(f"'{path}': {'; '.join(problems)}.")

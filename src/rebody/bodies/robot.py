@@ -7,28 +7,28 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
+from rebody.bodies.attitude import Floats
+from rebody.bodies.attitude import wrap_angle as wrap_angle  # where others look for it
 from rebody.bodies.control_step import steps_per_decision
-from rebody.bodies.model import PLANE_JOINTS, compile_model
+from rebody.bodies.model import PLANE_JOINTS, Compiled, Space, compile_model
+from rebody.bodies.readout import HINGE, SLIDE, FreeReadout, PlanarReadout, Readout
 from rebody.errors import RebodyError
 from rebody.ranges import Finite, Positive
-from rebody.types import DECISION_DT, GlobalState, global_state
-
-Floats = Float[np.ndarray, "..."]
-
-_FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
-_SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+from rebody.types import GlobalState
 
 
 @dataclass(frozen=True)
 class Fall:
-    """When a robot counts as fallen: too low or too much aslant, for long enough."""
+    """When a robot counts as fallen: too low, too much aslant or on its side, for long enough."""
 
     min_height: float = -math.inf
     """Of the torso above the floor [m]."""
     max_pitch: float = math.inf
     """Either way [rad]."""
+    min_up: float = -math.inf
+    """How much of the root body's up axis points up: 1 upright, 0 on its side, -1 upside down."""
     lasts_s: float = 0.0
     """Seconds without a break."""
 
@@ -67,7 +67,7 @@ class Reach:
 
 @dataclass(frozen=True)
 class RobotSpec:
-    """A planar robot: its model, its control rate and its observation mapping (thesis 5.7)."""
+    """A robot: its model, its control rate and its observation mapping (thesis 5.7)."""
 
     name: str
     mjcf: Path
@@ -75,7 +75,7 @@ class RobotSpec:
     """Simulation steps of one control step."""
     root: tuple[str, str, str] | str
     """Names of the joints that carry x [m], z [m] and pitch [rad] of the root body, or the name of a root body that
-    floats freely: it is held to the plane of x and z then."""
+    floats freely, see `space`."""
     reset_noise: float
     """Half-width of the uniform noise on positions and std of that on velocities at a reset."""
     fall: Fall
@@ -92,13 +92,20 @@ class RobotSpec:
     """Seconds of a simulation step; None for what the model says."""
     rest: tuple[tuple[str, float], ...] = ()
     """Joints that rest elsewhere than in the model, and where [m, rad]."""
-    moving_fields: tuple[str, ...] = ("x", "z", "pitch", "vx", "vz", "pitch_rate")
-    """Fields of the global state that this body can move."""
+    space: Space = "plane"
+    """Whether a root body that floats freely is held to the plane of x and z."""
+    keyframe: str | None = None
+    """Name of the model's keyframe that it rests in, but for what `rest` says; None for the model's own pose."""
 
     @cached_property
+    def compiled(self) -> Compiled:
+        """The compiled model and what came with it; RebodyError where MuJoCo cannot use it."""
+        return compile_model(self.name, self.mjcf, self.root, self.space, self.timestep, self.keyframe)
+
+    @property
     def model(self) -> mujoco.MjModel:
         """The compiled model; RebodyError where MuJoCo cannot use it."""
-        return compile_model(self.name, self.mjcf, self.root, self.timestep)
+        return self.compiled.model
 
     @cached_property
     def control_dt(self) -> float:
@@ -111,31 +118,51 @@ class RobotSpec:
         return steps_per_decision(self.name, self.frame_skip, self.model.opt.timestep)
 
     @property
+    def floats_freely(self) -> bool:
+        """Whether its root moves in space, and not in the plane alone."""
+        return self.space == "free"
+
+    @property
+    def moving_fields(self) -> tuple[str, ...]:
+        """Fields of the global state that this body can move."""
+        return FreeReadout.moving_fields if self.floats_freely else PlanarReadout.moving_fields
+
+    @cached_property
+    def readout(self) -> Readout:
+        """The observation mapping."""
+        if isinstance(self.root, str) and self.floats_freely:
+            return FreeReadout(self.model, self.rest_qpos, self.root)
+        return PlanarReadout(self.model, self.rest_qpos, self.root_joints)
+
+    @property
     def root_joints(self) -> tuple[str, str, str]:
-        """Names of the joints that carry x, z and pitch."""
+        """Names of the joints that carry x, z and pitch of a root in the plane."""
         return PLANE_JOINTS if isinstance(self.root, str) else self.root
 
-    @cached_property
+    @property
     def root_addresses(self) -> tuple[int, int, int]:
-        """Where x, z and pitch stand in qpos."""
-        x, z, pitch = (int(self.model.joint(name).qposadr[0]) for name in self.root_joints)
+        """Where x, z and pitch stand in qpos; RebodyError for a root that floats freely."""
+        if self.floats_freely:
+            raise RebodyError(f"robot '{self.name}' floats freely; this is for robots in the plane: space = \"plane\".")
+        x, z, pitch = (int(address) for address in self.readout.addresses)
         return x, z, pitch
 
-    @cached_property
+    @property
     def x_velocity_address(self) -> int:
         """Where the velocity of x stands in qvel."""
-        return int(self.model.joint(self.root_joints[0]).dofadr[0])
+        return int(self.readout.ground_velocity[0])
 
-    @cached_property
+    @property
     def root_body(self) -> int:
-        """Id of the body that pitch turns."""
-        return int(self.model.joint(self.root_joints[2]).bodyid[0])
+        """Id of the body that the root moves and turns."""
+        return self.readout.root_body
 
     @cached_property
     def rest_qpos(self) -> Float[np.ndarray, " nq"]:
         """Joint positions of the rest pose; RebodyError where `rest` names what is no slide or hinge."""
-        model, qpos = self.model, self.model.qpos0.copy()
-        joints = {model.joint(i).name: i for i in range(model.njnt) if model.jnt_type[i] in (_SLIDE, _HINGE)}
+        model, keyframe = self.model, self.compiled.keyframe
+        qpos = model.qpos0.copy() if keyframe is None else keyframe.copy()
+        joints = {model.joint(i).name: i for i in range(model.njnt) if model.jnt_type[i] in (SLIDE, HINGE)}
         for name, position in self.rest:
             if name not in joints:
                 raise RebodyError(
@@ -143,6 +170,7 @@ class RobotSpec:
                     f"those are {', '.join(filter(None, joints))}."
                 )
             qpos[model.jnt_qposadr[joints[name]]] = position
+        mujoco.mj_normalizeQuat(model, qpos)
         return qpos
 
     @cached_property
@@ -155,16 +183,12 @@ class RobotSpec:
 
     def observe(self, qpos: Floats, previous_qpos: Floats) -> GlobalState:
         """Global state from the joint positions of this decision and of the one before."""
-        x, z, pitch = (qpos[..., i].astype(np.float32) for i in self.root_addresses)
-        step = (qpos - previous_qpos) / DECISION_DT
-        vx, vz, pitch_rate = (step[..., i].astype(np.float32) for i in self.root_addresses)
-        above_rest = np.asarray(z - np.float32(self._rest_z))
-        return global_state(x=x, z=above_rest, pitch=wrap_angle(pitch), vx=vx, vz=vz, pitch_rate=pitch_rate)
+        return self.readout.observe(self.readout.root(qpos), self.readout.root(previous_qpos))
 
     @property
     def joint_inputs(self) -> int:
         """How many numbers the joint state has."""
-        return self.model.nq - 1 + self.model.nv
+        return self.readout.joint_inputs
 
     @property
     def tracker_inputs(self) -> int:
@@ -177,20 +201,8 @@ class RobotSpec:
         return np.asarray(pace + share * (moved / self.control_dt - pace))
 
     def joint_state(self, qpos: Floats, qvel: Floats) -> Float[np.ndarray, "... joint"]:
-        """Positions without x, pitch wrapped, then velocities of like size.
-
-        Bodies that float freely beside the robot stand at their x ahead of it; of the two quaternions of an
-        orientation it is the one with a real part that is not negative.
-        """
-        x, _, pitch = self.root_addresses
-        positions = qpos.copy()
-        positions[..., self._others_x] -= qpos[..., [x]]
-        for first in self._quaternions:
-            positions[..., first : first + 4] *= np.where(qpos[..., first, None] < 0, -1.0, 1.0)
-        positions = positions.astype(np.float32)
-        positions[..., pitch] = wrap_angle(positions[..., pitch])
-        velocities = (qvel * self._velocity_scale).astype(np.float32)
-        return np.concatenate([np.delete(positions, x, axis=-1), velocities], axis=-1)
+        """What its joints do: the same wherever it is and heads."""
+        return self.readout.joint_state(qpos, qvel)
 
     def tracker_state(self, qpos: Floats, qvel: Floats, pace: Floats) -> Float[np.ndarray, "... joint"]:
         """What a tracker sees of the body: the joint state, and the pace where that is more than a step's speed."""
@@ -199,41 +211,16 @@ class RobotSpec:
             return joints
         return np.concatenate([joints, np.asarray(pace, np.float32)[..., None]], axis=-1)
 
-    @cached_property
-    def _velocity_scale(self) -> Float[np.ndarray, " nv"]:
-        # a leg's hinge turns at 10 rad/s where the trunk moves at 1 m/s
-        model = self.model
-        kind, place = model.jnt_type[model.dof_jntid], np.arange(model.nv) - model.jnt_dofadr[model.dof_jntid]
-        is_slide = (kind == _SLIDE) | ((kind == _FREE) & (place < 3))
-        return np.where(is_slide, 1.0, 0.1)
-
-    @cached_property
-    def _others_x(self) -> Int[np.ndarray, " free"]:
-        """Where the x of bodies that float freely stands in qpos."""
-        return self.model.jnt_qposadr[self.model.jnt_type == _FREE]
-
-    @cached_property
-    def _quaternions(self) -> Int[np.ndarray, " quaternion"]:
-        """Where orientations begin in qpos."""
-        kind, first = self.model.jnt_type, self.model.jnt_qposadr
-        return np.concatenate([first[kind == _BALL], first[kind == _FREE] + 3])
+    def pose(self, qpos: Floats) -> Float[np.ndarray, "... 6"]:
+        """x, y, z [m], roll, pitch and yaw [rad] now, relative to the rest pose."""
+        return self.readout.pose(self.readout.root(qpos))
 
     def pitch(self, qpos: Floats) -> Floats:
         """Pitch of the root body, in (-pi, pi] [rad]."""
-        return wrap_angle(qpos[..., self.root_addresses[2]])
+        return np.asarray(self.pose(qpos)[..., 4])
 
     def lies(self, qpos: Floats) -> Bool[np.ndarray, "..."]:
         """Whether each robot lies on the ground at this moment."""
-        z = qpos[..., self.root_addresses[1]] - self._rest_z
+        *_, z, roll, pitch, _ = np.moveaxis(self.pose(qpos), -1, 0)
         is_low = self.torso_height + z < self.fall.min_height
-        return is_low | (np.abs(self.pitch(qpos)) > self.fall.max_pitch)
-
-    @cached_property
-    def _rest_z(self) -> float:
-        # not zero where the slide joint has a `ref` (hopper, walker: 1.25)
-        return float(self.rest_qpos[self.root_addresses[1]])
-
-
-def wrap_angle(angle: Floats) -> Floats:
-    """An angle in (-pi, pi] [rad]."""
-    return np.asarray(-((np.pi - angle) % (2 * np.pi) - np.pi), angle.dtype)
+        return is_low | (np.abs(pitch) > self.fall.max_pitch) | (np.cos(roll) * np.cos(pitch) < self.fall.min_up)

@@ -4,8 +4,8 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from rebody.bodies import RobotSpec, load_robot
-from rebody.envs.bodies import PointMasses, Robots
+from rebody.bodies import PointMasses, RobotBatch, RobotSpec, load_robot
+from rebody.bodies.toys import MassDamper
 from rebody.envs.single import TaskEnv
 from rebody.envs.vector import TaskVectorEnv
 
@@ -21,7 +21,7 @@ class PointMassEnv(TaskEnv):
 
     def __init__(self, **settings: Any):
         """Settings as `TaskEnv` has them."""
-        super().__init__(PointMasses(1), **settings)
+        super().__init__(PointMasses(MassDamper(), 1), **settings)
 
 
 class PointMassVectorEnv(TaskVectorEnv):
@@ -31,7 +31,7 @@ class PointMassVectorEnv(TaskVectorEnv):
 
     def __init__(self, num_envs: int = 1, **settings: Any):
         """Settings as `TaskVectorEnv` has them."""
-        super().__init__(PointMasses(num_envs), **settings)
+        super().__init__(PointMasses(MassDamper(), num_envs), **settings)
 
 
 class RobotEnv(TaskEnv):
@@ -43,7 +43,7 @@ class RobotEnv(TaskEnv):
         """`robot` is a shipped name or the path of a TOML file; settings as `TaskEnv` has them."""
         spec = load_robot(robot)
         self.metadata = _robot_metadata(spec)
-        super().__init__(Robots(spec, 1, threads=1), **settings)
+        super().__init__(RobotBatch(spec, 1, threads=1), **settings)
 
 
 class RobotVectorEnv(TaskVectorEnv):
@@ -55,7 +55,7 @@ class RobotVectorEnv(TaskVectorEnv):
         """`threads` = 0 uses every processor; the rest as for `RobotEnv` and `TaskVectorEnv`."""
         spec = load_robot(robot)
         self.metadata = _robot_metadata(spec) | _NEXT_STEP
-        super().__init__(Robots(spec, num_envs, threads), **settings)
+        super().__init__(RobotBatch(spec, num_envs, threads), **settings)
 
 
 def _robot_metadata(spec: RobotSpec) -> dict[str, Any]:

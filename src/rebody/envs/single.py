@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 
 from rebody import inputs
-from rebody.envs.bodies import Bodies
+from rebody.bodies import Simulation
 from rebody.envs.seeds import body_seed
 from rebody.envs.world import DEFAULT_BASE_TASKS, World, task_of_options
 from rebody.tasks import BaseTask
@@ -18,7 +18,7 @@ class TaskEnv(gymnasium.Env):
 
     def __init__(
         self,
-        bodies: Bodies,
+        bodies: Simulation,
         *,
         base_tasks: Sequence[BaseTask] = DEFAULT_BASE_TASKS,
         reward: str = "plain",

@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 from jaxtyping import Bool
 
 from rebody import inputs
-from rebody.envs.bodies import Bodies
+from rebody.bodies import Simulation
 from rebody.envs.seeds import body_seeds
 from rebody.envs.world import DEFAULT_BASE_TASKS, World, task_of_options
 from rebody.errors import RebodyError
@@ -24,7 +24,7 @@ class TaskVectorEnv(VectorEnv):
 
     def __init__(
         self,
-        bodies: Bodies,
+        bodies: Simulation,
         *,
         max_episode_steps: int | None = None,
         base_tasks: Sequence[BaseTask] = DEFAULT_BASE_TASKS,

@@ -10,8 +10,8 @@ from gymnasium import spaces
 from jaxtyping import Float
 
 from rebody import inputs
+from rebody.bodies import Simulation
 from rebody.bodies.camera import Camera
-from rebody.envs.bodies import Bodies
 from rebody.errors import RebodyError, unknown
 from rebody.jax_settings import own_jax_settings
 from rebody.tasks import BaseTask, RewardForm, TaskDistribution, family_index, family_names, reward
@@ -29,7 +29,7 @@ DEFAULT_BASE_TASKS = (
 class World:
     """The bodies and tasks of one environment."""
 
-    def __init__(self, bodies: Bodies, base_tasks: Sequence[BaseTask], reward_form: str):
+    def __init__(self, bodies: Simulation, base_tasks: Sequence[BaseTask], reward_form: str):
         """RebodyError where there is no base task, an unknown family or an unknown form of the reward."""
         if not base_tasks:
             raise RebodyError("base_tasks is empty; give at least one BaseTask(family, low, high).")
@@ -48,8 +48,7 @@ class World:
     @property
     def observation_space(self) -> spaces.Box:
         """qpos with x, then qvel, of one body."""
-        size = self.bodies.qpos.shape[1] + self.bodies.qvel.shape[1]
-        return spaces.Box(-np.inf, np.inf, (size,), np.float64)
+        return spaces.Box(-np.inf, np.inf, self.bodies.observation().shape[1:], np.float64)
 
     @property
     def action_space(self) -> spaces.Box:
@@ -60,7 +59,7 @@ class World:
         """Put one body at its start and give it that task, else a drawn one."""
         task = self._tasks.draw(rng) if task is None else task
         self._families[body], self._targets[body] = task.family, task.target
-        self.bodies.reset(body, rng)
+        self.bodies.reset(rng, np.arange(self.bodies.size) == body)
         self._begun[body] = True
 
     def step(self, actions: Float[np.ndarray, "body action"]) -> None:
@@ -71,25 +70,25 @@ class World:
 
     def observations(self) -> Float[np.ndarray, "body observation"]:
         """qpos with x, then qvel."""
-        return np.concatenate([self.bodies.qpos, self.bodies.qvel], axis=-1)
+        return self.bodies.observation()
 
     @own_jax_settings()
     def rewards(self) -> Float[np.ndarray, " body"]:
         """The tasks' rewards of the last step."""
         task = Task(self._families, self._targets)
-        return np.asarray(_reward(task, self.bodies.global_state(), self._form), np.float64)
+        return np.asarray(_reward(task, self.bodies.observe(), self._form), np.float64)
 
     def info(self) -> dict[str, np.ndarray]:
         """Each body's task, which agents are not told, and its global state; arrays over bodies."""
         names = np.array(family_names(), dtype=object)
-        state = self.bodies.global_state()
+        state = self.bodies.observe()
         values = {field: getattr(state, field).astype(np.float64) for field in GLOBAL_FIELDS}
         return {"family": names[self._families], "target": self._targets.copy()} | values
 
     def pictures(self) -> tuple[np.ndarray, ...]:
         """Every body, each [height, width, 3] of uint8."""
         self._camera = self._camera or Camera(self.bodies.model, root=self.bodies.root)
-        return tuple(self._camera.picture(qpos) for qpos in self.bodies.qpos)
+        return tuple(self._camera.picture(qpos) for qpos in self.bodies.picture_pose())
 
     def close(self) -> None:
         """Release the camera; `pictures` opens another."""

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Int
 
 from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import follow
-from rebody.bodies import RobotBatch, RobotSpec
+from rebody.bodies import RobotBatch, RobotSpec, Simulation
 from rebody.control.tracker import Tracker
 from rebody.tasks import GOAL, family_index
 from rebody.types import Subgoal
@@ -65,11 +65,11 @@ def stress(tracker: Tracker, spec: RobotSpec, episodes: int, seed: int = 0) -> S
     return StressResult(fell, batch.fallen.copy())
 
 
-def _subgoals(tracker: Tracker, batch: RobotBatch, rng: np.random.Generator) -> Subgoal:
+def _subgoals(tracker: Tracker, batch: Simulation, rng: np.random.Generator) -> Subgoal:
     """One of each robot, within reach of where it is."""
     limits, size = tracker.reach.limits, batch.size
     values = np.stack([rng.uniform(*ends, size) for ends in limits.values()])
     slots = np.array([family_index(name) for name in limits], np.int32)
     which = rng.integers(len(slots), size=size)
     slot, value = slots[which], values[which, np.arange(size)]
-    return Subgoal(slot, np.where(slot == GOAL, batch.x + value, value).astype(np.float32))
+    return Subgoal(slot, np.where(slot == GOAL, batch.pose()[:, 0] + value, value).astype(np.float32))

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from rebody.bodies import RobotBatch, RobotSpec
+from rebody.bodies import RobotSpec, Simulation
 from rebody.bodies.camera import Camera, Pole
 from rebody.errors import RebodyError
 from rebody.evaluation.episode import EpisodeResult
@@ -40,8 +40,8 @@ def film(trial: Trial, spec: TaskSpec, path: Path, on_progress: Callable[[float]
     _check_ffmpeg()
     poses: list[Float[np.ndarray, " nq"]] = []
 
-    def remember(batch: RobotBatch, _: object) -> None:
-        poses.append(batch.qpos[0].copy())
+    def remember(body: Simulation, _: object) -> None:
+        poses.append(body.picture_pose()[0])
 
     episode = evaluate(replace(trial, on_frame=remember), [spec], 1).episodes[0]
     frames = _frames(trial.robot, poses, episode)

@@ -77,7 +77,7 @@ class Page:
 
     def _begin(self) -> None:
         """What is remembered of an episode, at its start."""
-        self._pace = Pace(self.session.step_s, time.monotonic())
+        self._pace = Pace(self.session.body.step_s, time.monotonic())
         self._seen: tuple[Moment | None, TaskSpec] | None = None
         self._drawn: Moment | None = None
         self._latent_due = 0.0
@@ -149,8 +149,7 @@ class Page:
     def _show(self, now: float) -> None:
         """Bring the page up to date with the session."""
         session = self.session
-        pose = session.previous_pose + self._pace.share * (session.pose - session.previous_pose)
-        x = float(pose[session.body.x_address])
+        pose, x = session.between(self._pace.share)
         moment = session.moments[-1] if session.moments else None
         self._scene.show_body(pose, x)
         self._scene.show_marks(session.task, moment, x)

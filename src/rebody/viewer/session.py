@@ -5,17 +5,18 @@ from collections import deque
 from dataclasses import dataclass
 
 import jax
+import numpy as np
+from jaxtyping import Float
 
 from rebody.agents.agent import Observation
 from rebody.agents.belief import Reading
-from rebody.agents.clock import begin, decide
-from rebody.agents.rollout import task_reward
+from rebody.agents.rollout import Drive
+from rebody.bodies import PointMasses, RobotBatch, Simulation
 from rebody.evaluation.evaluate import Trial, check_trial, trial_agent, trial_controller
 from rebody.inputs import number
 from rebody.tasks import FAMILIES
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, GlobalState
-from rebody.viewer.body import Body, RobotBody, ToyBody
 
 REMEMBERED_S = 20.0
 """How far back moments are kept [s]."""
@@ -47,9 +48,11 @@ class Session:
         self.trial = trial
         self.moments: deque[Moment] = deque(maxlen=round(REMEMBERED_S / DECISION_DT))
         self.set_task(task)
-        robot, toy = trial.robot, trial.inference.toy
-        self.body: Body = RobotBody(robot, trial_controller(trial)) if robot else ToyBody(toy)
-        self.step_s = DECISION_DT / self.body.steps_per_decision
+        self.body: Simulation
+        if trial.robot is None:
+            self.body, self._controller = PointMasses(trial.inference.toy, 1), None
+        else:
+            self.body, self._controller = RobotBatch(trial.robot, 1, threads=1), trial_controller(trial)
         self.restart()
         for _ in range(self.body.steps_per_decision):
             self.step()
@@ -57,26 +60,34 @@ class Session:
 
     def restart(self, seed: int = 0) -> None:
         """Back to x = 0; the agent forgets everything, the task stays."""
-        self.body.reset(seed)
-        self.pose = self.previous_pose = self.body.qpos
-        self._steps = 0
-        state = self.body.observe()
-        self._carry, self._command = begin(self._agent, state)
-        self._listener = self.trial.inference.begin(_fields(state, self.trial))
+        self.body.reset(np.random.default_rng(seed))
+        self._now = self._before = self._seen()
+        self._drive = Drive(self._agent, self._controller, self.body, self.trial.inference.contract.reward)
+        self._listener = self.trial.inference.begin(_fields(self.body.observe(), self.trial))
         self.moments.clear()
 
     def step(self) -> None:
-        """One step of the body, which takes `step_s`; every 0.1 s a decision follows."""
-        self.body.step(self._command, self._carry.belief)
-        self.previous_pose, self.pose = self.pose, self.body.qpos
-        self._steps += 1
-        if self._steps % self.body.steps_per_decision == 0:
-            self._decide()
+        """One step of the body, which takes `body.step_s`; every 0.1 s a decision follows."""
+        self._drive.agent = self._agent
+        heard = self._drive.step(jax.tree.map(lambda field: field[0], self._tasks))
+        self._before, self._now = self._now, self._seen()
+        if heard is not None:
+            self._remember(heard)
+
+    @property
+    def x(self) -> float:
+        """Where the body is [m]."""
+        return self._now[1]
+
+    def between(self, share: float) -> tuple[Float[np.ndarray, " nq"], float]:
+        """Joint positions for a picture and x [m], that share of the way from the step before to the last one."""
+        (before, x_before), (now, x) = self._before, self._now
+        return before + share * (now - before), x_before + share * (x - x_before)
 
     @property
     def time_s(self) -> float:
         """Simulated seconds since the start."""
-        return self._steps * self.step_s
+        return self._drive.steps * self.body.step_s
 
     def set_task(self, task: TaskSpec) -> None:
         """Another hidden task from now on; only the oracle is told. RebodyError if the module cannot infer it
@@ -90,18 +101,19 @@ class Session:
 
     def push(self, change: float) -> None:
         """Change the velocity of the body's centre of mass along x [m/s]; RebodyError if that is no number."""
-        self.body.push(number(change, "the push"))
+        self.body.push(np.array([number(change, "the push")]))
 
-    def _decide(self) -> None:
-        state, form = self.body.observe(), self.trial.inference.contract.reward
-        earned = task_reward(jax.tree.map(lambda field: field[0], self._tasks), state, form)
-        self._carry, self._command = decide(self._agent, self._carry, Observation(state, earned))
-        reading = self._listener.update(_fields(state, self.trial), earned[0])
-        heard = float(earned[0]), reading, self._listener.doubts()
-        self.moments.append(Moment(self.time_s, self.task, _reached(state), *heard, self._subgoal()))
+    def _seen(self) -> tuple[Float[np.ndarray, " nq"], float]:
+        """Joint positions for a picture, and x [m]."""
+        return self.body.picture_pose()[0], float(self.body.pose()[0, 0])
+
+    def _remember(self, heard: Observation) -> None:
+        reading = self._listener.update(_fields(heard.state, self.trial), heard.reward[0])
+        said = float(heard.reward[0]), reading, self._listener.doubts()
+        self.moments.append(Moment(self.time_s, self.task, _reached(heard.state), *said, self._subgoal()))
 
     def _subgoal(self) -> TaskSpec | None:
-        subgoal = self._command.subgoal
+        subgoal = self._drive.command.subgoal
         value = float(subgoal.value[0])
         if self.trial.robot is None or not math.isfinite(value):
             return None

@@ -60,7 +60,7 @@ def loading(robot: str) -> str:
 def status(session: Session, speed: float, is_paused: bool) -> str:
     """What goes on, as HTML."""
     going = "paused" if is_paused else f"{speed:.1f} x real time" if speed else "starting"
-    fallen = '<br><b style="color:#c0392b">It has fallen. Press Restart.</b>' if session.body.has_fallen else ""
+    fallen = '<br><b style="color:#c0392b">It has fallen. Press Restart.</b>' if session.body.fallen.any() else ""
     doubts = session.moments[-1].doubts if session.moments else ()
     doubtful = "".join(f'<br><b style="color:#c0392b">Doubtful:</b> {html.escape(doubt)}' for doubt in doubts)
     return _line(f"<b>{session.time_s:.1f} s</b>, {going}{fallen}{doubtful}")

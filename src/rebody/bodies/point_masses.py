@@ -1,0 +1,95 @@
+"""Point masses as bodies that are simulated from outside, a decision at a time."""
+
+from functools import cached_property
+
+import equinox as eqx
+import jax
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from rebody.bodies.simulation import Simulation
+from rebody.bodies.toy_models import toy_model
+from rebody.bodies.toys import Toy
+from rebody.jax_settings import own_jax_settings
+from rebody.types import POSE_FIELDS, AnyArray, global_state
+
+FIELDS = ("x", "z", "pitch", "vx", "vz", "pitch_rate")
+"""What a nominal toy continues from; a state has them in this order."""
+
+
+class PointMasses(Simulation):
+    """Nominal toys, at rest after a reset. A step is a decision of 0.1 s."""
+
+    steps_per_decision, root = 1, 1
+
+    def __init__(self, toy: Toy, size: int):
+        self.size, self.actions, self._toy = size, toy.actions, toy
+        self._state = np.zeros((size, len(FIELDS)), np.float32)
+
+    @cached_property
+    def model(self) -> mujoco.MjModel:
+        """The toy's MuJoCo model."""
+        return toy_model(self._toy)
+
+    def picture_pose(self):
+        """x, and where it has them z and pitch."""
+        return self._state[:, : self.model.nq].astype(np.float64)
+
+    def reset(self, rng, who=None):
+        """There is no noise."""
+        self._state[slice(None) if who is None else who] = 0.0
+
+    def place(self, x, y=None, yaw=None, who=None):
+        """Along x."""
+        self._state[slice(None) if who is None else who, 0] = x
+
+    def push(self, change):
+        """A position toy, which moves by steps and has no momentum, does not mind."""
+        self._state[:, 3] += change if change.ndim == 1 else change[:, 0]
+
+    @own_jax_settings()
+    def step(self, actions):
+        """One decision."""
+        self._state = np.array(_advance(self._toy, self._state, actions.astype(np.float32)))
+
+    def observe(self):
+        """The toy's own readout."""
+        state = self._state.copy()
+        return global_state(**{name: state[:, i] for i, name in enumerate(FIELDS)})
+
+    def pose(self):
+        """The pose of what is observed."""
+        return self.observe().select(POSE_FIELDS).astype(np.float64)
+
+    def joint_state(self):
+        """All but x."""
+        return self.observation()[:, 1:].astype(np.float32)
+
+    def observation(self):
+        """As the model has them."""
+        count = self.model.nq
+        return self._state[:, [*range(count), *range(3, 3 + count)]].astype(np.float64)
+
+    @property
+    def fallen(self):
+        """None ever."""
+        return np.zeros(self.size, np.bool_)
+
+    @property
+    def state(self):
+        """A copy."""
+        return self._state.copy()
+
+    @state.setter
+    def state(self, value):
+        self._state[:] = value
+
+
+@eqx.filter_jit
+def _advance(
+    toy: Toy, state: Float[AnyArray, "body field"], actions: Float[AnyArray, "body action"]
+) -> Float[AnyArray, "body field"]:
+    here = global_state(**{name: state[:, i] for i, name in enumerate(FIELDS)})
+    # a nominal toy has no noise, so its key does not matter
+    return toy.observe(toy.step(toy.from_global(here), actions, jax.random.key(0))).select(FIELDS)
