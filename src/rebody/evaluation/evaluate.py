@@ -2,7 +2,8 @@
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import jax
 import numpy as np
@@ -36,12 +37,13 @@ from rebody.agents.parts import (
 from rebody.agents.rollout import Episodes, OnFrame, Starts, rollout_on_robot, rollout_on_toy
 from rebody.bodies import RobotSpec
 from rebody.bodies.toys import Toy
-from rebody.control.tracker import slots_of
+from rebody.control.command import slots_among
 from rebody.errors import RebodyError
 from rebody.evaluation.results import Results, episode_results
 from rebody.inference.contract import Contract
 from rebody.jax_settings import own_jax_settings
 from rebody.store import tree_hash
+from rebody.tasks import FamilySet
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, Task
 
@@ -57,6 +59,8 @@ class Trial:
 
     agent: str
     inference: Inference
+    families: FamilySet
+    """What a name of a task means beside the module's own; `in_play` has them all."""
     robot: RobotSpec | None
     """None for the point mass."""
     tracker: LoadedTracker | None
@@ -97,6 +101,12 @@ class Trial:
         """Of that module."""
         return self.scratch.name if self.scratch else self.inference.name
 
+    @cached_property
+    def in_play(self) -> FamilySet:
+        """The module's families, the tracker's, then all others whose names are known."""
+        own = self.contract.families
+        return (own.beside(self.tracker.tracker.families) if self.tracker else own).beside(self.families)
+
     @property
     def decisions(self) -> int:
         """Times 0.1 s of one episode."""
@@ -130,6 +140,7 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int, yardsticks: Yardst
     RebodyError where module, policies, tasks and robot do not fit together, or there is too much to do at once.
     """
     yardsticks = yardsticks or take_yardsticks(trial, specs, seeds)
+    trial = narrowed(trial, specs)
     check_trial(trial, specs)
     specs, episode_seeds, tasks = _episodes_of(trial, specs, seeds)
     agent = trial_agent(trial, tasks)
@@ -147,7 +158,10 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int, yardsticks: Yardst
         horizon=trial.horizon,
         thesis=trial.thesis,
         frozen=frozen,
-        episodes=episode_results(specs, episode_seeds, tasks, episodes, read, clusters, yardsticks.returns),
+        family_set=trial.in_play,
+        episodes=episode_results(
+            trial.in_play, specs, episode_seeds, tasks, episodes, read, clusters, yardsticks.returns
+        ),
     )
 
 
@@ -156,6 +170,7 @@ def take_yardsticks(trial: Trial, specs: list[TaskSpec], seeds: int) -> Yardstic
     """Oracle and idle in place of a trial's agent: none for a robot without a tracker, and no oracle where that has no
     slot for a task. RebodyError as `evaluate`.
     """
+    trial = narrowed(trial, specs)
     check_trial(trial, specs)
     _check_size(trial, len(specs) * seeds)
     if trial.robot is not None and trial.tracker is None:
@@ -170,12 +185,18 @@ def take_yardsticks(trial: Trial, specs: list[TaskSpec], seeds: int) -> Yardstic
     return Yardsticks(None if _without_slot(trial, specs) else run("oracle"), run("idle"))
 
 
+def narrowed(trial: Trial, specs: list[TaskSpec]) -> Trial:
+    """The trial with the families that it takes, and no others, in play."""
+    asked = dict.fromkeys(family for spec in specs for family in spec.families)
+    return replace(trial, families=trial.in_play.only(tuple(asked)))
+
+
 def start_seeds(specs: list[TaskSpec], seeds: Int[np.ndarray, " episode"]) -> list[int]:
     """What the start of each episode is drawn from: its task and its evaluation seed, whatever else is evaluated.
 
     Were it the evaluation seed alone, all tasks of a seed would share one start, and be one sample of starts.
     """
-    texts = [json.dumps([asdict(spec), int(seed)]) for spec, seed in zip(specs, seeds, strict=True)]
+    texts = [json.dumps([spec.to_json(), int(seed)]) for spec, seed in zip(specs, seeds, strict=True)]
     return [int.from_bytes(hashlib.sha256(text.encode()).digest()[:8]) for text in texts]
 
 
@@ -185,7 +206,7 @@ def _episodes_of(
     """Task and evaluation seed of each episode, and the tasks that are active, [time, episode]."""
     specs = [spec for spec in specs for _ in range(seeds)]
     episode_seeds = np.tile(np.arange(seeds), len(specs) // seeds)
-    return specs, episode_seeds, active_tasks(specs, trial.decisions, DECISION_DT)
+    return specs, episode_seeds, active_tasks(specs, trial.in_play, trial.decisions, DECISION_DT)
 
 
 def frozen_hashes(inference: Inference) -> dict[str, str]:
@@ -203,6 +224,7 @@ def trial_agent(trial: Trial, tasks: Task) -> Agent:
         trial.agent,
         trial.inference,
         tasks,
+        families=trial.in_play,
         slots=slots,
         high_level=trial.high_level.policy if trial.high_level else None,
         scratch=trial.scratch.parts if trial.scratch else None,
@@ -213,12 +235,12 @@ def trial_agent(trial: Trial, tasks: Task) -> Agent:
 
 def run_trial(trial: Trial, agent: Agent, tasks: Task, starts: Starts) -> Episodes:
     """Episodes as arrays, 0.1 s apart; `tasks` are the active ones, [time, episode], `starts` seeds of the resets."""
-    form = trial.contract.reward
+    families = trial.in_play
     if trial.robot is None:
-        episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, form)
+        episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, families)
     else:
         clock, controller = _clock(trial), trial_controller(trial)
-        episodes = rollout_on_robot(agent, controller, trial.robot, tasks, form, starts, trial.on_frame, clock)
+        episodes = rollout_on_robot(agent, controller, trial.robot, tasks, families, starts, trial.on_frame, clock)
     return jax.tree.map(np.asarray, episodes)
 
 
@@ -234,7 +256,10 @@ def _clock(trial: Trial) -> Clock | None:
     """When the agent decides; None for our mode."""
     if not trial.thesis:
         return None
-    return PredictedClock(trial.step_predictor.predictor) if trial.step_predictor else EvenClock(trial.stride)
+    if trial.step_predictor is None:
+        return EvenClock(trial.stride)
+    predictor = trial.step_predictor.predictor
+    return PredictedClock(predictor, slots_among(trial.in_play, predictor.families))
 
 
 def trial_controller(trial: Trial) -> Controller:
@@ -247,7 +272,7 @@ def trial_controller(trial: Trial) -> Controller:
         return FlatController(trial.scratch.parts.policy, trial.scratch.parts.module.decoder)
     assert trial.tracker is not None
     assert trial.robot is not None
-    return TrackerController(trial.tracker.tracker, trial.robot.goal_ahead)
+    return TrackerController(trial.tracker.tracker, trial.in_play, trial.robot.goal_ahead)
 
 
 def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
@@ -266,7 +291,7 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
         if kind.on_robots_alone:
             raise RebodyError(f"agent '{trial.agent}' learned on a robot, and a point mass is none.")
         return
-    slots = trial.tracker.tracker.slots if trial.tracker else slots_of(trial.robot.reach)
+    slots = trial.tracker.tracker.families.names if trial.tracker else tuple(name for name, _ in trial.robot.reach)
     trial.contract.check_body(trial.robot.name, trial.robot.moving_fields, slots)
     if trial.agent == "oracle" and (missing := _without_slot(trial, specs)):
         # what the other agents are asked for, their module knows, and that fits the tracker
@@ -289,15 +314,15 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
         check_step_predictor(trial.step_predictor, trial.tracker, trial.inference)
     for part in (trial.tracker, trial.flat, trial.scratch, trial.high_level):
         if part is not None:
-            check_sizes(part, trial.robot, trial.inference.parts.module.encoder)
+            check_sizes(part, trial.robot, trial.inference)
 
 
 def _without_slot(trial: Trial, specs: list[TaskSpec]) -> list[str]:
     """Families of the tasks that a robot's tracker cannot be commanded in."""
     if trial.tracker is None:
         return []
-    asked = dict.fromkeys(family for spec in specs for family in (spec.family, spec.last.family))
-    return [family for family in asked if family not in trial.tracker.tracker.slots]
+    asked = dict.fromkeys(family for spec in specs for family in spec.families)
+    return [family for family in asked if family not in trial.tracker.tracker.families]
 
 
 def _check_size(trial: Trial, episodes: int) -> None:
@@ -310,11 +335,11 @@ def _check_size(trial: Trial, episodes: int) -> None:
 
 
 def _check_tasks(trial: Trial, specs: list[TaskSpec]) -> None:
-    known = trial.contract.target_ranges
+    known = trial.contract.families.names
     for spec in specs:
         if spec.switch is not None and round(spec.switch.at_s / DECISION_DT) >= trial.decisions:
             raise RebodyError(f"a switch at {spec.switch.at_s:g} s is not within an episode of {trial.seconds:g} s.")
-        for family in {spec.family, spec.last.family}:
+        for family in spec.families:
             # a robot's oracle and an idle one need no module
             if family not in known and (trial.robot is None or trial.agent not in ("oracle", "idle")):
                 raise RebodyError(
