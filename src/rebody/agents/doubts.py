@@ -4,10 +4,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from rebody.inference.contract import Contract
 from rebody.tasks import Quantity
-from rebody.tasks.bounds import Vector, payable
+from rebody.tasks.bounds import payable
 from rebody.types import DECISION_DT, GlobalState
 
 SLACK, TOLERANCE = 1.25, 0.01
@@ -17,6 +18,9 @@ STUCK = 10
 """Decisions of one and the same reward, while the body moved, after which it counts as stuck."""
 RECENT_S = 3.2
 """How long a doubt is kept up by default [s]: as long as a belief rests on what was heard."""
+
+Ends = tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]
+"""Between which a quantity was meanwhile; each family's has a size of its own."""
 
 
 @dataclass
@@ -106,7 +110,7 @@ class RewardWatch:
         self._same = self._same + 1 if is_same and has_moved else 1
         self._last_reward = reward
 
-    def _bounds(self, moved: list[tuple[Vector, Vector]], *, trained: bool) -> tuple[float, float]:
+    def _bounds(self, moved: list[Ends], *, trained: bool) -> tuple[float, float]:
         """Over all families, by the targets that the module was trained on, or by any."""
         of_each = [
             payable(family, ends, family.range if trained else None)
@@ -115,7 +119,7 @@ class RewardWatch:
         return min(worst for worst, _ in of_each), max(best for _, best in of_each)
 
 
-def _moved(quantity: Quantity, previous: GlobalState, state: GlobalState) -> tuple[Vector, Vector]:
+def _moved(quantity: Quantity, previous: GlobalState, state: GlobalState) -> Ends:
     before, after = (np.asarray(quantity.read(each), float).reshape(-1, quantity.size)[0] for each in (previous, state))
     return before, after
 

@@ -56,7 +56,7 @@ def owners(places: Places) -> Int[np.ndarray, " number"]:
     return np.repeat(np.arange(len(places)), [place.size for place in places])
 
 
-def split_places(places: Places, numbers: Float[AnyArray, "*batch number"]) -> Sequence[Float[AnyArray, "*batch size"]]:
+def split_places(places: Places, numbers: Float[AnyArray, "*batch number"]) -> Sequence[Float[AnyArray, "*batch _"]]:
     """The numbers of each."""
     return jnp.split(jnp.asarray(numbers), np.cumsum([place.size for place in places])[:-1], axis=-1)
 
@@ -67,7 +67,7 @@ def lengths(places: Places, numbers: Float[AnyArray, "*batch number"]) -> Float[
 
 
 def seen_from(
-    places: Places, here: Sequence[Float[AnyArray, "*batch size"]], understood: Belief
+    places: Places, here: Sequence[Float[AnyArray, "*batch _"]], understood: Belief
 ) -> Float[AnyArray, "*batch feature"]:
     """What an interpreted belief (mean [share of each place, its numbers]) says, from where the body is: how likely
     each place is meant, how far ahead it is, how far that is from zero, and how sure.

@@ -80,7 +80,7 @@ def tracker_observation(
     joints: Float[AnyArray, "*batch joint"], command: Command, families: FamilySet
 ) -> Float[AnyArray, "*batch feature"]:
     """Joint state and command, what is to be reached on three scales so that centimetres count as metres do."""
-    is_slot = [(command.slot == i).astype(joints.dtype) for i in range(len(families))]
+    is_slot = [jnp.asarray(command.slot == i, joints.dtype) for i in range(len(families))]
     features = [*is_slot]
     for here, family in zip(is_slot, families, strict=True):
         for i, name in enumerate(family.quantity.components):

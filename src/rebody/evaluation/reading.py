@@ -72,6 +72,9 @@ def _of_version_1(entry: dict[str, Any]) -> dict[str, Any]:
     """It had numbers for vectors, four quantities by names of their own, vz as its largest of a second, no idle."""
     quantities = {name: entry.get(old) for name, old in _QUANTITIES_OF_VERSION_1.items()}
     vectors = {name: _vectors(entry.get(name)) for name in _NUMBERS_OF_VERSION_1}
+    switch = entry.get("switch")
+    if isinstance(switch, dict):
+        vectors["switch"] = switch | {"target": _vectors(switch.get("target"))}
     return _of_version_2(entry) | vectors | {"quantities": quantities, "idle_return": None}
 
 

@@ -80,13 +80,15 @@ class Expert(eqx.Module):
 
     def doubt(self, amount: Belief) -> Float[AnyArray, "*batch field"]:
         """Variance of that place, scaled; of a heading to first order."""
-        said, spread = self.reference(amount.mean), amount.variance @ self.reference.weights[0] ** 2
+        said, weights = self.reference(amount.mean), self.reference.weights[0]
+        spread = amount.variance @ weights**2
         columns, i = [], 0
         for field, scale in zip(self.fields, self.scales, strict=True):
             if field in CIRCULAR:
-                sine, cosine = said[..., i], said[..., i + 1]
-                across = spread[..., i] * cosine**2 + spread[..., i + 1] * sine**2
-                columns.append(across / jnp.maximum(sine**2 + cosine**2, 1e-6) ** 2 / scale**2)
+                sine, cosine = said[..., i, None], said[..., i + 1, None]
+                across = cosine * weights[:, i] - sine * weights[:, i + 1]  # both hang on the same amounts
+                turn = across / jnp.maximum(sine**2 + cosine**2, 1e-6) / scale
+                columns.append(jnp.sum(amount.variance * turn**2, axis=-1))
                 i += 1
             else:
                 columns.append(spread[..., i])

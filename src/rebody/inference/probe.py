@@ -35,7 +35,7 @@ class Probe(eqx.Module):
         """Of each family."""
         return jax.nn.softmax(self._logits(belief), axis=-1)
 
-    def spreads(self, belief: Belief) -> list[tuple[Float[AnyArray, "*batch size"], Float[AnyArray, "*batch size"]]]:
+    def spreads(self, belief: Belief) -> list[tuple[Float[AnyArray, "*batch _"], Float[AnyArray, "*batch _"]]]:
         """Of each family, were it the one: mean and standard deviation of its target, as sure as the belief is."""
         means = _with_one(jnp, belief.mean) @ self.target_weights
         deviations = jnp.sqrt(belief.variance @ self.target_weights[:-1] ** 2)
@@ -45,7 +45,7 @@ class Probe(eqx.Module):
     def _logits(self, belief: Belief) -> Float[Array, "*batch family"]:
         return _with_one(jnp, belief.mean) @ self.family_weights
 
-    def _split(self, numbers: Float[AnyArray, "*batch number"]) -> list[tuple[Family, Float[AnyArray, "*batch own"]]]:
+    def _split(self, numbers: Float[AnyArray, "*batch number"]) -> list[tuple[Family, Float[AnyArray, "*batch _"]]]:
         ends = np.cumsum([_numbers(family) for family in self.families])[:-1]
         return list(zip(self.families, jnp.split(numbers, ends, axis=-1), strict=True))
 

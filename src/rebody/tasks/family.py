@@ -120,7 +120,7 @@ class Family:
         if not self.directions:
             return np.zeros(target.shape[:-1], int)
         apart = [self.quantity.distance(target, np.asarray(each.towards)) for each in self.directions]
-        return np.argmin(np.stack(apart, axis=-1), axis=-1)
+        return np.asarray(np.argmin(np.stack(apart, axis=-1), axis=-1))
 
     def direction_chances(self, mean: Any, std: Any) -> Float[np.ndarray, " direction"]:
         """How likely each direction is under a diagonal Gaussian over the target, [size] each."""

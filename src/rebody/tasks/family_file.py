@@ -64,5 +64,5 @@ def _of_python(path: Path, content: bytes) -> FamilySet:
         return FamilySet(tuple(replace(each, law_source=LAWS[each.law].source) for each in said["families"]()))
     except RebodyError as error:
         raise RebodyError(f"'{path}': {error}") from error
-    except Exception as error:  # it is anybody's code
+    except (Exception, SystemExit) as error:  # it is anybody's code
         raise RebodyError(f"'{path}' does not give families: {type(error).__name__}: {error}. {WANTED}") from error

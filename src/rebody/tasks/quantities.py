@@ -75,7 +75,7 @@ def along_heading(state: GlobalState) -> GlobalState:
     """The same with horizontal velocities along (vx) and across (vy, to the left) the heading."""
     xp = jnp if isinstance(state.yaw, jax.Array) else np
     vx, vy = turned(state.vx, state.vy, -state.yaw, xp)
-    return GlobalState(**{**vars(state), "vx": vx, "vy": vy})
+    return GlobalState(**{**vars(state), "vx": xp.asarray(vx), "vy": xp.asarray(vy)})
 
 
 def turned(x: Any, y: Any, angle: Any, xp: Any) -> tuple[Any, Any]:
