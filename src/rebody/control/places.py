@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from rebody.ranges import Positive
+from rebody.ranges import Box, Positive
+from rebody.tasks.family import Family
 from rebody.tasks.family_set import FamilySet
 from rebody.tasks.quantities import Quantity, length, wrapped_where
 from rebody.types import AnyArray, Belief, GlobalState, Task
@@ -35,6 +36,19 @@ class Place:
     def here(self, state: GlobalState) -> Float[AnyArray, "*batch size"]:
         """Where the body is, in the same units."""
         return self.quantity.read(state) / jnp.asarray(self.scales)
+
+
+def reachable(family: Family, reach: Box | None) -> Box:
+    """All between a family's smallest and largest targets, but no speed or attitude that a robot does not reach.
+
+    Places may lie farther off than a tracker is shown them; None where a robot sets no limits.
+    """
+    if reach is None:
+        return family.range
+    is_far = [name in UNBOUNDED for name in family.quantity.components]
+    ends = (family.range.low, family.range.high)
+    low, high = (np.where(is_far, end, np.clip(end, reach.low, reach.high)).tolist() for end in ends)
+    return Box(tuple(low), tuple(high))
 
 
 Places = tuple[Place, ...]

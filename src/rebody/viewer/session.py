@@ -11,7 +11,7 @@ from rebody.agents.agent import Observation
 from rebody.agents.belief import Reading
 from rebody.agents.rollout import Drive
 from rebody.bodies import PointMasses, RobotBatch, Simulation
-from rebody.control.places import UNBOUNDED
+from rebody.control.places import reachable
 from rebody.evaluation.evaluate import Trial, check_trial, trial_agent, trial_controller
 from rebody.inputs import number
 from rebody.ranges import Box
@@ -124,13 +124,8 @@ class Session:
 
 def target_range(trial: Trial, family: str) -> Box:
     """Smallest and largest target that the module has learned and the robot is able to reach [m, m/s, rad]."""
-    known, box = trial.inference.contract.families.named(family), trial.inference.contract.families.ranges[family]
-    reach = trial.tracker.tracker.families.ranges.get(family) if trial.tracker else None
-    if reach is None:
-        return box
-    is_far = [name in UNBOUNDED for name in known.quantity.components]  # may lie farther off than it is shown them
-    low, high = (np.where(is_far, end, np.clip(end, reach.low, reach.high)).tolist() for end in (box.low, box.high))
-    return Box(tuple(low), tuple(high))
+    reach = trial.tracker.tracker.families.ranges if trial.tracker else {}
+    return reachable(trial.inference.contract.families.named(family), reach.get(family))
 
 
 def fitting(trial: Trial, task: TaskSpec) -> TaskSpec:
