@@ -7,8 +7,8 @@ import pytest
 from rebody.bodies.toys import MassDamper
 from rebody.control.command import commands_within
 from rebody.control.tracker import MARGIN
-from rebody.ranges import interval
-from rebody.tasks import SHIPPED
+from rebody.ranges import Box, interval
+from rebody.tasks import SHIPPED, Family, FamilySet, Quantity
 from rebody.training.tracker.commands import CommandDistribution, ToyGuide, _scripted_action
 from rebody.types import Task, global_state
 
@@ -171,3 +171,47 @@ def test_a_wanted_pitch_does_not_depend_on_the_robots_own(lopsided):
     stands = np.asarray(command.slot) == STAND
     assert abs(np.corrcoef(pitch[stands], unwrapped(pitch, command)[STAND][stands])[0, 1]) < 0.05
     assert np.corrcoef(pitch[stands], command.value[stands, 0])[0, 1] < -0.5
+
+
+PLACE = Family(
+    name="place",
+    quantity=Quantity("position", ("x", "y"), "m", "position"),
+    targets=(Box((-4.0, -2.0), (4.0, 2.0)),),
+    floor=1.0,
+    tolerance=0.25,
+)
+HEADING = Family(
+    name="heading",
+    quantity=Quantity("yaw", ("yaw",), "rad", "heading"),
+    targets=(interval(-3.0, 3.0),),
+    floor=0.3,
+    tolerance=0.2,
+)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 2.0])
+def test_places_in_the_plane_are_asked_for_on_all_sides(yaw):
+    """From where the robot is, however it is turned; near ones as often at every scale, far ones from a box."""
+    pose = upright()
+    pose[:, :2], pose[:, 5] = (50.0, -7.0), yaw
+    families = FamilySet((SHIPPED.named("velocity"), PLACE))
+    command = CommandDistribution(near_share=0.4, zero_share=0.0).sample(jax.random.key(0), pose, families)
+    ahead = np.asarray(command.value)[np.asarray(command.slot) == 1]
+    assert np.abs(ahead).max(axis=0) == pytest.approx((4.0 * MARGIN, 2.0 * MARGIN), rel=0.01)
+    np.testing.assert_allclose(ahead.mean(axis=0), 0.0, atol=0.05)
+    distance = np.hypot(*ahead.T)
+    for low in (0.01, 0.1):
+        by_chance = 0.6 * np.pi * (100 - 1) * low**2 / (4 * 4.4 * 2.2)
+        share = np.mean((distance > low) & (distance <= 10 * low))
+        assert share == pytest.approx(0.2 + by_chance, abs=ROUGHLY)
+    near = ahead[distance < 0.1]
+    np.testing.assert_allclose(np.abs(near).sum(axis=0) / np.abs(near).sum(), 0.5, atol=0.03)
+
+
+def test_headings_are_asked_for_from_how_the_robot_is_turned():
+    pose = upright()
+    pose[:, 5] = 3.0
+    command = CommandDistribution(zero_share=0.0).sample(jax.random.key(0), pose, FamilySet((HEADING,)))
+    turn = np.asarray(command.value)[:, 0]
+    assert np.abs(turn).max() <= np.pi + 1e-6
+    assert np.mean(turn > 0) == pytest.approx(0.5, abs=ROUGHLY)
