@@ -3,6 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import scipy.stats
 from jaxtyping import Float, Int
@@ -12,7 +14,7 @@ from rebody.errors import RebodyError
 from rebody.ranges import Box, Finite, Positive
 from rebody.tasks.laws import LAWS, RewardLaw, law_named
 from rebody.tasks.quantities import Quantity
-from rebody.types import GLOBAL_FIELDS, RATE_OF
+from rebody.types import GLOBAL_FIELDS, RATE_OF, AnyArray
 
 Settle = Literal["last", "mean of 1 s", "largest of 1 s"]
 """What of a quantity is judged at a moment: its value there, or what it was over the second before."""
@@ -114,13 +116,14 @@ class Family:
         """By their indices; one without a name where targets have none."""
         return tuple(direction.name for direction in self.directions) or ("",)
 
-    def direction(self, target: Any) -> Int[np.ndarray, "*batch"]:
-        """Index of the direction of targets [*batch, size]; 0 where the family has none."""
-        target = np.asarray(target)
+    def direction(self, target: Any) -> Int[AnyArray, "*batch"]:
+        """Index of the direction of targets [*batch, size], of NumPy or JAX; 0 where the family has none."""
+        xp = jnp if isinstance(target, jax.Array) else np
+        target = xp.asarray(target)
         if not self.directions:
-            return np.zeros(target.shape[:-1], int)
-        apart = [self.quantity.distance(target, np.asarray(each.towards)) for each in self.directions]
-        return np.asarray(np.argmin(np.stack(apart, axis=-1), axis=-1))
+            return xp.zeros(target.shape[:-1], int)
+        apart = [self.quantity.distance(target, xp.asarray(each.towards)) for each in self.directions]
+        return xp.argmin(xp.stack(apart, axis=-1), axis=-1)
 
     def direction_chances(self, mean: Any, std: Any) -> Float[np.ndarray, " direction"]:
         """How likely each direction is under a diagonal Gaussian over the target, [size] each."""

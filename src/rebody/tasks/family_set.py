@@ -136,11 +136,12 @@ class FamilySet:
         """Whether that is how each family judges."""
         return jnp.asarray([each.settle == settle for each in self.families])[family]
 
-    def base_task(self, task: Task) -> Int[np.ndarray, "*batch"]:
-        """Family and direction as one index: the thesis counts front and back as two."""
-        family, target = np.asarray(task.family), np.asarray(task.target)
-        of_each = np.stack([first + each.direction(target[..., : each.size]) for first, each in self._first_base_tasks])
-        return np.take_along_axis(of_each, family[None], axis=0)[0]
+    def base_task(self, task: Task) -> Int[AnyArray, "*batch"]:
+        """Family and direction as one index, of NumPy or JAX: the thesis counts front and back as two."""
+        xp = jnp if isinstance(task.target, jax.Array) else np
+        of_each = [first + each.direction(task.target[..., : each.size]) for first, each in self._first_base_tasks]
+        which: Any = xp.asarray(task.family)[None]
+        return xp.take_along_axis(xp.stack(of_each), which, axis=0)[0]
 
     @property
     def base_tasks(self) -> int:
