@@ -90,7 +90,7 @@ def test_a_push_changes_the_velocity(fresh):
         fresh.step()
         return fresh.x
 
-    assert moved(0.5) - moved(0.0) == pytest.approx(0.5 * fresh.step_s, rel=0.35)
+    assert moved(0.5) - moved(0.0) == pytest.approx(0.5 * fresh.body.step_s, rel=0.35)
 
 
 def test_a_restart_forgets_all_but_the_task(fresh):
