@@ -112,9 +112,7 @@ class FlatLearner(Learner[TaskInference]):
             seen = SACBatch(
                 observation=observation,
                 action=action,
-                reward=privileged_reward(
-                    batch, before, known.task, action, families, self.commands, self.config.reward
-                ),
+                reward=paid,
                 next_observation=self.observe(batch, known.belief),
                 terminal=np.zeros(batch.size, np.float32),  # what has fallen goes on
             )
