@@ -123,7 +123,7 @@ class Family:
         if not self.directions:
             return xp.zeros(target.shape[:-1], int)
         apart = [self.quantity.distance(target, xp.asarray(each.towards)) for each in self.directions]
-        return xp.argmin(xp.stack(apart, axis=-1), axis=-1)
+        return xp.asarray(xp.argmin(xp.stack(apart, axis=-1), axis=-1))
 
     def direction_chances(self, mean: Any, std: Any) -> Float[np.ndarray, " direction"]:
         """How likely each direction is under a diagonal Gaussian over the target, [size] each."""
