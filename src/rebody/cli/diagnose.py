@@ -39,7 +39,8 @@ class Diagnose:
         if self.out is not None:
             for agent in LADDER:
                 check_output(self.out / f"{agent}.json", "--out", inputs=(self.tasks,))
-        specs, trial, console = read_tasks(self.tasks), self.trial.load(), Console()
+        trial, console = self.trial.load(), Console()
+        specs = read_tasks(self.tasks, trial.in_play)
         with console.status("") as status:
             diagnosis = diagnose(trial, specs, self.seeds, lambda agent: status.update(_doing(agent)))
         for table in diagnosis_tables(diagnosis):

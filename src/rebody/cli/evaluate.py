@@ -30,8 +30,8 @@ class Evaluate:
     def run(self) -> None:
         """Evaluate, print the table, save."""
         check_output(self.json, "--json", inputs=(self.tasks, self.trial.robot))
-        specs = read_tasks(self.tasks)
         trial = self.trial.load()
+        specs = read_tasks(self.tasks, trial.in_play)
         console = Console()
         with console.status(f"{len(specs) * self.seeds} episodes of {trial.seconds:g} s"):
             yardsticks = take_yardsticks(trial, specs, self.seeds)

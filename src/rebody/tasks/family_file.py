@@ -33,8 +33,11 @@ def read_families(path: Path | None) -> FamilySet:
 
     None for those that ship alone. A Python file is run: read it before you trust it.
     """
-    if path is None:
-        return SHIPPED
+    return SHIPPED if path is None else own_families(path).beside(SHIPPED)
+
+
+def own_families(path: Path) -> FamilySet:
+    """Those of a file alone, as `read_families`."""
     try:
         content = read_file(path, TEXT)
     except OSError as error:
@@ -43,7 +46,7 @@ def read_families(path: Path | None) -> FamilySet:
     families = read(path, content)
     if taken := sorted(set(families.names) & set(SHIPPED.names)):
         raise RebodyError(f"'{path}': the name '{taken[0]}' is taken by a family that ships; choose another one.")
-    return families.beside(SHIPPED)
+    return families
 
 
 def _of_toml(path: Path, content: bytes) -> FamilySet:

@@ -62,7 +62,7 @@ class Session:
         """Back to x = 0; the agent forgets everything, the task stays."""
         self.body.reset(np.random.default_rng(seed))
         self._now = self._before = self._seen()
-        self._drive = Drive(self._agent, self._controller, self.body, self.trial.inference.contract.reward)
+        self._drive = Drive(self._agent, self._controller, self.body, self.trial.in_play)
         self._listener = self.trial.inference.begin(_fields(self.body.observe(), self.trial))
         self.moments.clear()
 

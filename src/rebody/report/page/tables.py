@@ -42,7 +42,7 @@ def _row(episode: EpisodeResult) -> list[str]:
     return [
         _task(episode),
         str(episode.seed),
-        f"{episode.inferred_family[-1]} {_vector(episode.inferred_target[-1], '+.3f')}",
+        f"{episode.inferred_family[-1]} {vector(episode.inferred_target[-1], '+.3f')}",
         f"{episode.final_error:.3f} {episode.last_family.unit}",
         f"{episode.ripple_m_s:.3f}",
         f"{episode.return_:.2f}",
@@ -52,17 +52,18 @@ def _row(episode: EpisodeResult) -> list[str]:
 
 
 def _task(episode: EpisodeResult) -> str:
-    text = f"{episode.family} {_vector(episode.target)}"
+    text = f"{episode.family} {vector(episode.target)}"
     if episode.switch is None:
         return text
     at_s, family, target = (episode.switch.get(name) for name in ("at_s", "family", "target"))
     numbers = target if isinstance(target, list | tuple) else [target]  # a number in files of earlier releases
     if not all(isinstance(number, float | int) for number in (at_s, *numbers)):
-        return f"{text}, then {episode.active_family[-1]} {_vector(episode.active_target[-1])}"
-    return f"{text}, from {at_s:g} s {family} {_vector(numbers)}"
+        return f"{text}, then {episode.active_family[-1]} {vector(episode.active_target[-1])}"
+    return f"{text}, from {at_s:g} s {family} {vector(numbers)}"
 
 
-def _vector(numbers: Sequence[Any], form: str = "+.3g") -> str:
+def vector(numbers: Sequence[Any], form: str = "+.3g") -> str:
+    """Its numbers in words."""
     return ", ".join(format(number, form) for number in numbers)
 
 

@@ -13,9 +13,12 @@ FAST = 2.5
 """A robot that has to balance and is to run faster than this [m/s] is told to go slowly first."""
 
 
-def tracker_preset(spec: RobotSpec) -> TrackerConfig:
-    """Settings for a robot that lies on its belly when it does nothing, or for one that has to balance."""
-    families = commands_within(spec.reach, SHIPPED)
+def tracker_preset(spec: RobotSpec, known: FamilySet = SHIPPED) -> TrackerConfig:
+    """Settings for a robot that lies on its belly when it does nothing, or for one that has to balance.
+
+    RebodyError where its reach is about a family that is not known.
+    """
+    families = commands_within(spec.reach, known)
     sprawling = TrackerConfig(families=families)
     if len(families) > 2:  # a slot more is more to learn
         sprawling = replace(sprawling, iterations=1100, sac=replace(sprawling.sac, decay_updates=280_000))
