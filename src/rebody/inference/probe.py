@@ -14,6 +14,8 @@ from rebody.tasks import Family, FamilySet
 from rebody.types import AnyArray, Belief
 
 RIDGE = 1e-6
+NEVER = -1e9
+"""Logit of a family that there was no sample of."""
 
 
 class Probe(eqx.Module):
@@ -62,7 +64,7 @@ def fit_probe(
     family: Int[np.ndarray, " sample"],
     target: Float[np.ndarray, "sample axis"],
 ) -> Probe:
-    """Fit on latents whose tasks are known."""
+    """Fit on latents whose tasks are known; nothing is read of a family that there is no sample of."""
     # takes a second to import, which every command would wait for
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.linear_model import LogisticRegression, Ridge
@@ -70,16 +72,20 @@ def fit_probe(
     latent, numbers = latent.astype(float), []
     for i, each in enumerate(families):
         own = family == i
-        ridge = Ridge(alpha=RIDGE * own.sum()).fit(latent[own], _as_numbers(each, target[own, : each.size]))
-        numbers.append(np.vstack([np.atleast_2d(ridge.coef_).T, ridge.intercept_]))
+        weights = np.zeros((latent.shape[1] + 1, _numbers(each)))
+        if own.any():
+            ridge = Ridge(alpha=RIDGE * own.sum()).fit(latent[own], _as_numbers(each, target[own, : each.size]))
+            weights = np.vstack([np.atleast_2d(ridge.coef_).T, ridge.intercept_])
+        numbers.append(weights)
     weights = np.zeros((latent.shape[1] + 1, len(families)))
-    if len(families) > 1:
+    if len(seen := np.unique(family)) > 1:
         logistic = LogisticRegression(C=1 / (2 * RIDGE * len(latent)), max_iter=1000)
         with warnings.catch_warnings():  # families that are told apart perfectly have no best weights
             warnings.simplefilter("ignore", ConvergenceWarning)
             logistic.fit(latent, family)
         both = np.vstack([logistic.coef_.T, logistic.intercept_])
-        weights = np.hstack([-both / 2, both / 2]) if len(families) == 2 else both
+        weights[-1] = np.where(np.isin(np.arange(len(families)), seen), 0.0, NEVER)
+        weights[:, seen] = np.hstack([-both / 2, both / 2]) if len(seen) == 2 else both
     return Probe(weights.astype(np.float32), np.hstack(numbers).astype(np.float32), families)
 
 

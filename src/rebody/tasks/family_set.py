@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int, PRNGKeyArray
 from rebody.errors import unknown
 from rebody.ranges import Box
 from rebody.tasks.family import Family, Settle
+from rebody.tasks.laws import law_named
 from rebody.tasks.quantities import length, wrapped_where
 from rebody.types import AnyArray, GlobalState, Task
 
@@ -78,6 +79,10 @@ class FamilySet:
     def only(self, names: tuple[str, ...]) -> "FamilySet":
         """Those families, in this order."""
         return FamilySet(tuple(self.named(name) for name in names))
+
+    def paid_by(self, law: str) -> "FamilySet":
+        """The same, each paid by that law; RebodyError where there is none of that name."""
+        return FamilySet(tuple(family.within(*family.targets, law=law_named(law).name) for family in self.families))
 
     def beside(self, others: "FamilySet") -> "FamilySet":
         """These, then those of the others whose names are new: indices stay what they are."""
