@@ -9,7 +9,6 @@ from rebody import inputs
 from rebody.bodies import Simulation
 from rebody.envs.seeds import body_seed
 from rebody.envs.world import DEFAULT_FAMILIES, World, task_of_options
-from rebody.tasks import FamilySet
 
 
 class TaskEnv(gymnasium.Env):
@@ -19,10 +18,10 @@ class TaskEnv(gymnasium.Env):
         self,
         bodies: Simulation,
         *,
-        families: FamilySet = DEFAULT_FAMILIES,
+        families: Any = DEFAULT_FAMILIES,
         render_mode: str | None = None,
     ):
-        """Tasks are drawn from the families' targets unless `reset` is told one; their laws say what is paid."""
+        """Tasks are drawn from the targets of a `FamilySet` unless `reset` is told one; its laws say what is paid."""
         self._world = World(bodies, families)
         self.render_mode = render_mode
         self.observation_space = self._world.observation_space

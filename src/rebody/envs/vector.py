@@ -27,7 +27,7 @@ class TaskVectorEnv(VectorEnv):
         bodies: Simulation,
         *,
         max_episode_steps: int | None = None,
-        families: FamilySet = DEFAULT_FAMILIES,
+        families: Any = DEFAULT_FAMILIES,
         render_mode: str | None = None,
     ):
         """As `TaskEnv`; episodes end after `max_episode_steps`, never where that is None."""

@@ -32,11 +32,12 @@ DEFAULT_FAMILIES = FamilySet(
 class World:
     """The bodies and tasks of one environment."""
 
-    def __init__(self, bodies: Simulation, families: FamilySet):
+    def __init__(self, bodies: Simulation, families: Any):
         """RebodyError where what is given is no set of families."""
         if not isinstance(families, FamilySet):
             raise RebodyError(f"families is {families!r}; give a rebody.tasks.FamilySet of at least one family.")
-        self.bodies, self.families = bodies, families
+        self.bodies = bodies
+        self.families: FamilySet = families
         self._family = np.zeros(bodies.size, np.int32)
         self._target = np.zeros((bodies.size, families.size))
         self._begun = np.zeros(bodies.size, np.bool_)
