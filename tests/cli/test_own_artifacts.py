@@ -84,7 +84,7 @@ def test_the_json_is_as_documented(robot, trained, evaluate, capsys):
         assert (np.diff(np.ravel(episode["subgoal"]))[::2] == 0).all()  # held for two decisions
         assert isinstance(episode["oracle_return"], float)
     switched = results["episodes"][2]
-    assert switched["switch"] == TASKS[1]["switch"]
+    assert switched["switch"] == TASKS[1]["switch"] | {"target": [4.0]}
     assert switched["active_target"] == 15 * [[-1.0]] + 15 * [[4.0]]
     assert results["summary"]["families"]["goal"]["episodes"] == 4
 
