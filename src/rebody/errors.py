@@ -16,7 +16,8 @@ def unknown(kind: str, name: object, known: Iterable[str], more: str = "") -> Re
     known = list(known)
     guess = did_you_mean(str(name), known)
     listed = ", ".join([*known, more] if more else known)
-    return RebodyError(f"unknown {kind} '{name}'.{guess} {kind.capitalize()}s are: {listed}.")
+    plural = f"{kind.removesuffix('y')}ies" if kind.endswith("y") else f"{kind}s"
+    return RebodyError(f"unknown {kind} '{name}'.{guess} {plural.capitalize()} are: {listed}.")
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -13,7 +13,7 @@ from rebody.agents.rollout import Episodes
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, save_results, summary_table
 from rebody.evaluation.results import episode_results
-from rebody.ranges import Box
+from rebody.ranges import Box, interval
 from rebody.tasks import SHIPPED, FamilySet, Quantity
 from rebody.tasks.line import GOAL as GOALS
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
@@ -96,15 +96,25 @@ def test_a_full_disk_leaves_the_old_file(results, tmp_path, monkeypatch):
     assert read(path)["robot"] == "cheetah"
 
 
+def shown(results):
+    with open(os.devnull, "w") as nowhere:
+        console = Console(width=200, record=True, file=nowhere)
+        console.print(summary_table(results))
+        return console.export_text()
+
+
 def test_the_table_shows_each_family_that_occurs(results):
-    console = Console(width=200, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
-    console.print(summary_table([results, replace(results, agent="oracle")]))
-    text = console.export_text()
-    console.file.close()
+    text = shown([results, replace(results, agent="oracle")])
     assert "cheetah, reuse" in text
     assert "goal: median error [m]" in text
     assert "100.0 %" in text  # within tolerance
     assert "velocity" not in text
+
+
+def test_families_of_one_name_share_a_row(results):
+    """Two modules may have learned other ranges of what they call the same."""
+    farther = FamilySet((GOALS.within(interval(0.0, 30.0)),))
+    assert shown([results, replace(results, family_set=farther)]).count("goal: median error") == 1
 
 
 @pytest.fixture(scope="module")

@@ -235,7 +235,7 @@ def test_names_are_unique(families):
 
 def test_a_name_that_there_is_not(mixed):
     for ask in (mixed.index, mixed.named, lambda name: mixed.only(("goal", name)), lambda name: mixed.task(name, 1.0)):
-        with pytest.raises(RebodyError, match=r"unknown family 'velocty'\. Did you mean 'velocity'\?.*goal"):
+        with pytest.raises(RebodyError, match=r"'velocty'\. Did you mean 'velocity'\? Families are: .*goal"):
             ask("velocty")
 
 

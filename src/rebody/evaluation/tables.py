@@ -30,7 +30,7 @@ def summary_table(results: Sequence[Results]) -> Table:
     table.add_column("")
     for result in results:
         table.add_column(f"{result.robot}, {result.agent}", justify="right")
-    for family in dict.fromkeys(family for result in results for family in result.families):
+    for family in {family.name: family for result in results for family in result.families}.values():
         ofs = [summary["families"].get(family.name, {}) for summary in summaries]
         table.add_row(f"{family.name}: episodes", *(str(of.get("episodes", 0)) for of in ofs))
         for name, key in FIGURES:
