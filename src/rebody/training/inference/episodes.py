@@ -37,9 +37,8 @@ class ToyWorld:
         task_key, disturbance_key = jax.random.split(key)
         tasks = sample_episodes(self.families, task_key, episodes, decisions, switch_share)
         rough = self.randomisation.sample(disturbance_key, (episodes,))
-        return jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), tasks), rough if disturbed else no_disturbance(
-            (episodes,)
-        )
+        disturbance = rough if disturbed else no_disturbance((episodes,))
+        return jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), tasks), disturbance
 
 
 class Roles(eqx.Module):
