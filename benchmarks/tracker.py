@@ -70,7 +70,7 @@ def _observe(joints, subgoal: Subgoal, pose):
 def errors(predict: Predict) -> dict[str, float]:
     """Median errors on held-out goals and speeds."""
     rng, (goal, velocity) = np.random.default_rng(2**31 - 1), FAMILIES
-    value = [rng.uniform(*goal.range.low, *goal.range.high, COMMANDS), speeds_within(velocity.range, COMMANDS, rng)]
+    value = [rng.uniform(goal.range.low[0], goal.range.high[0], COMMANDS), speeds_within(velocity.range, COMMANDS, rng)]
     slot = np.repeat([CONFIG.families.index(family.name) for family in FAMILIES], COMMANDS).astype(np.int32)
     subgoal = Subgoal(slot, np.concatenate(value).astype(np.float32)[:, None])
 
