@@ -283,7 +283,7 @@ def of_another_module(trial):
     return replace(trial.flat, inference_hash="0" * 64)
 
 
-SEES_YAW = Contract(("yaw",), 6, {"goal": (-9.0, 9.0)}, "plain")
+SEES_YAW = Contract(("yaw",), 6, FamilySet((GOAL,)))
 REFUSED = {
     "was trained on 'cheetah', not on 'hopper'": lambda trial: (
         replace(trial, robot=replace(load_robot("cheetah"), name="hopper")), SPECS,
