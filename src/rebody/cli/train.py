@@ -149,11 +149,14 @@ class TrainStepPredictor:
     """A robot's name (see `rebody list`), or the path of its TOML file."""
     tracker: str | None = None
     """Tracker artifact; default tracker-ROBOT."""
+    families: Path | None = None
+    """File of your own families, where the tracker knows any with a reward law of your own."""
     options: Start = field(default_factory=StartOptions)
     config: Annotated[StepPredictorConfig, FLAT] = field(default_factory=StepPredictorConfig)
 
     def run(self) -> None:
         """Train, save, say where."""
+        read_families(self.families)  # artifacts may name its laws
         _show_card(train_step_predictor(self.robot, self.tracker, self.config, **vars(self.options)))
 
 
@@ -219,9 +222,10 @@ def _word_behind(part: str, what: str, known: dict[str, str], arguments: Sequenc
 
 
 def _value_of(option: str, arguments: Sequence[str]) -> Path | None:
-    """What follows an option that is read before tyro reads all."""
-    at = list(arguments).index(option) + 1 if option in arguments else len(arguments)
-    return Path(arguments[at]) if at < len(arguments) else None
+    """What is behind an option, or behind its equals sign, that is read before tyro reads all."""
+    words = [word for each in arguments for word in (each.split("=", 1) if each.startswith(option) else [each])]
+    behind = words[words.index(option) + 1 :] if option in words else []
+    return Path(behind[0]) if behind else None
 
 
 def _show_card(folder: Path) -> None:
