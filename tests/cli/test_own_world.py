@@ -9,8 +9,8 @@ import pytest
 from rebody.agents.parts import load_inference, load_tracker
 from rebody.cli.main import run
 from rebody.cli.trial import TrialOptions
-from rebody.errors import RebodyError
 from rebody.evaluation import read_results
+from rebody.tasks import LAWS
 from rebody.tasks.task_file import parse_task
 from rebody.viewer.session import Session
 
@@ -180,13 +180,29 @@ def test_the_live_page_shows_it(trained):
     assert np.isfinite(moment.reading.target).all()
 
 
-def test_without_its_file_a_law_is_refused(trained):
+@pytest.mark.parametrize(
+    "command",
+    [
+        "run --inference module --robot point-mass --task lean=1.5,0.4 --seconds 3",
+        "stress --robot box.toml --tracker tracker --episodes 2",
+        f"train step-predictor --robot box.toml --tracker tracker --robots 2 --steps 20 {SAC} "
+        "--updates 1 --iterations 1 --replay 60 --held-out 2 --held-out-s 2 --out predictor",
+    ],
+    ids=lambda command: command.split(" -")[0],
+)
+def test_without_its_file_a_law_is_refused(command, trained, monkeypatch, capsys):
     """Artifacts carry no code."""
-    from rebody.tasks.laws import LAWS
+    monkeypatch.chdir(trained)
+    monkeypatch.delitem(LAWS, "saturating")
+    assert run(command.split()) == 2
+    assert "name the file that defines it, --families FILE" in capsys.readouterr().err
+    assert run([*command.split(), "--families=families.py"]) == 0
 
-    law = LAWS.pop("saturating")
-    try:
-        with pytest.raises(RebodyError, match="name the file that defines it, --families FILE"):
-            load_inference(str(trained / "module"))
-    finally:
-        LAWS["saturating"] = law
+
+def test_results_of_a_law_are_shown_with_its_file(trained, tmp_path, monkeypatch, capsys):
+    results, page = tmp_path / "out.json", ["--out", str(tmp_path / "report.html")]
+    assert run(["evaluate", "--tasks", str(trained / "tasks.json"), "--json", str(results), *flags(trained)]) == 0
+    monkeypatch.delitem(LAWS, "saturating")
+    assert run(["report", str(results), *page]) == 2
+    assert "name the file that defines it, --families FILE" in capsys.readouterr().err
+    assert run(["report", str(results), *page, "--families", str(trained / "families.py")]) == 0
