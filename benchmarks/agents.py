@@ -14,8 +14,8 @@ import numpy as np
 from rebody.agents.parts import load_flat, load_inference, load_tracker
 from rebody.bodies import load_robot
 from rebody.evaluation import Results, evaluate
-from rebody.evaluation.evaluate import Trial
 from rebody.evaluation.statistics import with_interval
+from rebody.evaluation.trial import Trial
 from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import read_tasks
 

@@ -16,7 +16,7 @@ from agents import cell
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, read_results, save_results
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.names import AGENTS
 from rebody.report.page import find, write_page
 from rebody.report.style import figure

@@ -17,7 +17,8 @@ import numpy as np
 
 from rebody.agents.parts import load_inference, load_tracker
 from rebody.bodies import load_robot
-from rebody.evaluation.evaluate import Trial, run_trial, start_seeds, trial_agent
+from rebody.evaluation.evaluate import run_trial, start_seeds, trial_agent
+from rebody.evaluation.trial import Trial
 from rebody.inference.probe import fit_probe
 from rebody.tasks import SHIPPED, FamilySet
 from rebody.tasks.line import GOAL

@@ -15,8 +15,9 @@ import numpy as np
 
 from rebody.agents.parts import load_inference, load_tracker
 from rebody.bodies import load_robot
-from rebody.evaluation.evaluate import Trial, run_trial, start_seeds, trial_agent
+from rebody.evaluation.evaluate import run_trial, start_seeds, trial_agent
 from rebody.evaluation.summary import percentile_95, with_interval
+from rebody.evaluation.trial import Trial
 from rebody.report.style import BELIEF, MOTION, figure
 from rebody.tasks import SHIPPED
 from rebody.tasks.figures import final_error

@@ -14,7 +14,7 @@ from rebody.agents.parts import load_inference, load_tracker
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, load_robot
 from rebody.evaluation import evaluate
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import Subgoal

@@ -17,7 +17,7 @@ from agents import cell
 from rebody.agents.parts import load_inference
 from rebody.bodies.toys import Toy
 from rebody.evaluation import evaluate
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.report.style import BELIEF, MOTION, figure
 from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import read_tasks

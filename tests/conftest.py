@@ -31,7 +31,7 @@ from rebody.control.flat import FlatPolicy, FlatView  # noqa: E402
 from rebody.control.sac import Actor, SACConfig  # noqa: E402
 from rebody.control.step_predictor import StepPredictor  # noqa: E402
 from rebody.control.tracker import Tracker  # noqa: E402
-from rebody.evaluation.evaluate import Trial  # noqa: E402
+from rebody.evaluation.trial import Trial  # noqa: E402
 from rebody.inference.contract import Contract  # noqa: E402
 from rebody.inference.probe import Probe  # noqa: E402
 from rebody.ranges import interval  # noqa: E402

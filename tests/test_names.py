@@ -2,7 +2,7 @@
 
 from rebody import names
 from rebody.agents.kinds import KINDS
-from rebody.evaluation.evaluate import POINT_MASS
+from rebody.evaluation.trial import POINT_MASS
 from rebody.report.thesis import FIGURES
 from rebody.store import load_artifact, shipped_artifacts
 from rebody.tasks import SHIPPED
@@ -10,8 +10,8 @@ from rebody.training.inference import PRESETS
 
 
 def test_families():
-    lines = {family.name: f"{family.unit}, solved within {family.tolerance:g}" for family in SHIPPED}
-    assert list(names.FAMILIES.items()) == list(lines.items())
+    lines = {each.name: f"{each.label}: {each.unit}, solved within {each.tolerance:g}" for each in SHIPPED}
+    assert list(names.families().items()) == list(lines.items())
 
 
 def test_agents():

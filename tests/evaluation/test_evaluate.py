@@ -16,7 +16,8 @@ from rebody.bodies import load_robot
 from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results
-from rebody.evaluation.evaluate import POINT_MASS, run_trial, take_yardsticks, trial_agent
+from rebody.evaluation.evaluate import run_trial, take_yardsticks, trial_agent
+from rebody.evaluation.trial import POINT_MASS
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import no_mixture
 from rebody.store import tree_hash

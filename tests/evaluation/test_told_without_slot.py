@@ -6,7 +6,8 @@ import pytest
 
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate
-from rebody.evaluation.evaluate import check_trial, take_yardsticks
+from rebody.evaluation.evaluate import take_yardsticks
+from rebody.evaluation.trial import check_trial
 from rebody.tasks import FamilySet, line
 from rebody.tasks.task_file import Switch, TaskSpec
 from rebody.viewer.session import Session

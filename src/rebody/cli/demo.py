@@ -14,7 +14,8 @@ from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, save_results, summary_table
 from rebody.evaluation.episode import EpisodeResult
-from rebody.evaluation.evaluate import Trial, take_yardsticks
+from rebody.evaluation.evaluate import take_yardsticks
+from rebody.evaluation.trial import Trial
 from rebody.report import plot_episode, plot_transfer
 from rebody.report.page.tables import vector
 from rebody.store import shipped_artifacts

@@ -10,7 +10,8 @@ from rich.console import Console
 from rebody.cli.output import check_output
 from rebody.cli.trial import TrialOptions
 from rebody.evaluation import evaluate, save_results, summary_table
-from rebody.evaluation.evaluate import Trial, Yardsticks, take_yardsticks
+from rebody.evaluation.evaluate import Yardsticks, take_yardsticks
+from rebody.evaluation.trial import Trial
 from rebody.ranges import Seeds
 from rebody.tasks.task_file import read_tasks
 

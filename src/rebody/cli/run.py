@@ -13,7 +13,7 @@ from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate
 from rebody.evaluation.episode import EpisodeResult
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.report import film, plot_episode
 from rebody.report.page.tables import vector
 from rebody.tasks.task_file import TaskSpec, parse_task

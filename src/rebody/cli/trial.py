@@ -19,7 +19,7 @@ from rebody.agents.parts import (
 )
 from rebody.bodies import load_robot
 from rebody.errors import RebodyError
-from rebody.evaluation.evaluate import POINT_MASS, Trial
+from rebody.evaluation.trial import POINT_MASS, Trial
 from rebody.names import AGENTS
 from rebody.ranges import Count, Decisions, Seconds
 from rebody.tasks.family_file import read_families

@@ -10,7 +10,7 @@ from rich.console import Console
 from rebody.bodies import shipped_robots
 from rebody.cli.trial import AGENT_HELP, TrialOptions
 from rebody.errors import RebodyError
-from rebody.evaluation.evaluate import POINT_MASS, Trial, check_trial
+from rebody.evaluation.trial import POINT_MASS, Trial, check_trial
 from rebody.ranges import Port
 from rebody.store import shipped_artifacts
 from rebody.tasks.task_file import parse_task

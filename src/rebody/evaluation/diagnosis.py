@@ -10,8 +10,9 @@ from jaxtyping import Float
 from rich.table import Table
 
 from rebody.evaluation.episode import EpisodeResult
-from rebody.evaluation.evaluate import POINT_MASS, Trial, evaluate, take_yardsticks
+from rebody.evaluation.evaluate import evaluate, take_yardsticks
 from rebody.evaluation.results import Results
+from rebody.evaluation.trial import POINT_MASS, Trial
 from rebody.tasks import Family
 from rebody.tasks.family_set import fit
 from rebody.tasks.figures import LAST_S

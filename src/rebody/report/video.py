@@ -17,7 +17,8 @@ from rebody.bodies import RobotSpec, Simulation
 from rebody.bodies.camera import Camera, Pole
 from rebody.errors import RebodyError
 from rebody.evaluation.episode import EpisodeResult
-from rebody.evaluation.evaluate import Trial, evaluate
+from rebody.evaluation.evaluate import evaluate
+from rebody.evaluation.trial import Trial
 from rebody.report.figures import draw_progress
 from rebody.store.files import written_whole
 from rebody.tasks.task_file import TaskSpec

@@ -157,7 +157,7 @@ class HighLevelLearner(Learner[TaskInference]):
 
     def update(self, policy: SACState, drawn: Any, key: PRNGKeyArray, iteration: int) -> tuple[SACState, dict]:
         """Values are of the slot that is chosen in the end."""
-        return learn(policy, drawn, key, slot_sac(self.config.sac, len(self.slots)), judge=SlotValue(self.slots))
+        return learn(policy, drawn, key, slot_sac(self.config.sac, len(self.slots)), action_value=SlotValue(self.slots))
 
     def measure(self, actor: Actor) -> dict[str, float]:
         """Final error of each family, return, share that fell."""

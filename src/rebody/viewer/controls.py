@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from rebody.errors import RebodyError
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.inputs import number
 from rebody.names import AGENTS
 from rebody.ranges import Box

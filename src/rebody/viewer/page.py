@@ -9,7 +9,7 @@ from collections.abc import Callable
 import viser
 
 from rebody.errors import RebodyError
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.controls import Choice, Controls, Offered, Order, Push, Restart

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import viser
 
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.latent import LatentPicture

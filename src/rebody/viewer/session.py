@@ -12,7 +12,8 @@ from rebody.agents.belief import Reading
 from rebody.agents.rollout import Drive
 from rebody.bodies import PointMasses, RobotBatch, Simulation
 from rebody.control.places import reachable
-from rebody.evaluation.evaluate import Trial, check_trial, trial_agent, trial_controller
+from rebody.evaluation.evaluate import trial_agent, trial_controller
+from rebody.evaluation.trial import Trial, check_trial
 from rebody.inputs import number
 from rebody.ranges import Box
 from rebody.tasks.task_file import TaskSpec, active_tasks

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import safetensors.numpy
 
-from rebody.evaluation.evaluate import Trial, check_trial, run_trial, start_seeds, trial_agent
+from rebody.evaluation.evaluate import run_trial, start_seeds, trial_agent
+from rebody.evaluation.trial import Trial, check_trial
 from rebody.store.files import written_whole
 from rebody.tasks.line import GOAL, LINE
 from rebody.tasks.task_file import TaskSpec, active_tasks

@@ -17,7 +17,7 @@ from rebody.bodies.camera import Camera
 from rebody.bodies.robot import Reach
 from rebody.bodies.toy_models import mass_damper_model
 from rebody.bodies.toys import MassDamper
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.report.thesis.data import Data, join, on_goals, trajectories
 from rebody.report.thesis.panels import EPISODES
 from rebody.tasks.line import GOAL, LINE
