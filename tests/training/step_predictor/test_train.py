@@ -9,16 +9,18 @@ import pytest
 from rebody.agents.parts import LoadedTracker
 from rebody.bodies import RobotBatch
 from rebody.control import sac
-from rebody.control.command import relative
+from rebody.control.command import commands_within, relative
 from rebody.control.sac import SACBatch, SACConfig
 from rebody.control.step_predictor import steps_of
-from rebody.control.tracker import tracker_observation
+from rebody.control.tracker import Tracker, command_inputs, tracker_observation
+from rebody.errors import RebodyError
 from rebody.store import tree_hash
+from rebody.tasks import SHIPPED
 from rebody.training.off_policy import initial_state, learn
 from rebody.training.replay import Replay
 from rebody.training.step_predictor import StepPredictorConfig
 from rebody.training.step_predictor.chase import Fixed, advance, begin
-from rebody.training.step_predictor.train import StepPredictorLearner
+from rebody.training.step_predictor.train import StepPredictorLearner, train_step_predictor
 
 GOAL, VELOCITY = range(2)  # slots
 ROBOTS, JOINTS = 5, 17
@@ -123,6 +125,25 @@ def test_tasks_change_only_when_a_subgoal_has_ended(walk):
         task = tree_hash(chase.task)
         assert task == before or before is None or len(seen.reward)
         before = task
+
+
+def test_only_places_and_speeds_along_x_are_chased_wherever_a_tracker_has_them(batch, cheetah, config):
+    families = commands_within(cheetah.reach, SHIPPED).only(("stand", "velocity", "goal"))
+    slots = set()
+    for seed in range(10):
+        chase = begin(batch, families, Fixed(jnp.asarray(2)), config, jax.random.key(seed))
+        np.testing.assert_array_equal(chase.subgoal.slot, chase.task.family)
+        slots |= {families[slot].name for slot in chase.subgoal.slot}
+    assert slots == {"velocity", "goal"}
+
+
+def test_a_tracker_that_knows_neither_is_refused(cheetah, config, tmp_path, monkeypatch):
+    families = commands_within(cheetah.reach, SHIPPED).only(("stand",))
+    actor = sac.Actor(JOINTS + command_inputs(families), cheetah.model.nu, config.sac, jax.random.key(0))
+    still = LoadedTracker("still", "cheetah", Tracker(actor, families))
+    monkeypatch.setattr("rebody.training.step_predictor.train.load_tracker", lambda name: still)
+    with pytest.raises(RebodyError, match="'still' is told neither places nor speeds along x"):
+        train_step_predictor("cheetah", "still", config, tmp_path, 0)
 
 
 def test_the_buffer_holds_every_subgoal_and_nothing_frozen_changes(batch, tracker, config):
