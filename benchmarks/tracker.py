@@ -75,7 +75,7 @@ def errors(predict: Predict) -> dict[str, float]:
     subgoal = Subgoal(slot, np.concatenate(value).astype(np.float32))
 
     def control_step(batch: RobotBatch) -> None:
-        batch.step(predict(np.asarray(_observe(batch.tracker_state(), subgoal, *place(batch)))))
+        batch.step(predict(np.asarray(_observe(batch.proprioception(), subgoal, *place(batch)))))
 
     states, _ = run_robots(SPEC, len(slot), control_step)
     found = final_error(Task(slot, subgoal.value), states)

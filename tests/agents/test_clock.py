@@ -92,4 +92,4 @@ def test_the_prediction_is_of_what_the_robot_sees_now(step_predictor, cheetah):
     steps = PredictedClock(step_predictor).steps(batch, subgoal)
     x, pitch = place(batch)
     np.testing.assert_array_equal(x, [0.0, 5.0, -3.0])
-    np.testing.assert_array_equal(steps, step_predictor(batch.tracker_state(), relative(subgoal, x, pitch)))
+    np.testing.assert_array_equal(steps, step_predictor(batch.proprioception(), relative(subgoal, x, pitch)))

@@ -23,7 +23,7 @@ def in_short(monkeypatch):
 def untrained(spec):
     """A tracker that hardly acts."""
     batch = RobotBatch(spec, 1, threads=1)
-    joints = batch.tracker_state()
+    joints = batch.proprioception()
     still = Command(np.zeros(1, np.int32), np.zeros(1, np.float32))
     size = tracker_observation(joints, still, spec.reach).shape[-1]
     return Tracker(Actor(size, spec.model.nu, SACConfig(hidden=(4,)), jax.random.key(0)), spec.reach)

@@ -102,7 +102,7 @@ def test_a_subgoal_is_held_for_a_decision(begun, learner):
     subgoal = Subgoal(np.full(ROBOTS, GOAL, np.int32), np.array([3.0, -3.0, 0.0], np.float32))
     _, fell = decision(batch, lambda _: follow(learner.controller, batch, subgoal))
     for _ in range(2):
-        joints, pitch = twin.tracker_state(), twin.spec.pitch(twin.qpos).astype(np.float32)
+        joints, pitch = twin.proprioception(), twin.spec.pitch(twin.qpos).astype(np.float32)
         twin.step(np.asarray(learner.controller(joints, twin.x.astype(np.float32), pitch, subgoal, None)))
     np.testing.assert_allclose(batch.qpos, twin.qpos, atol=1e-4)
     assert not fell.any()

@@ -5,6 +5,7 @@ the module makes of the rewards (thesis 6.3.2).
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import equinox as eqx
@@ -130,7 +131,7 @@ class FlatLearner(Learner[World]):
         interpreted = self.module.parts.module.decoder.interpret(belief)
         return np.asarray(self.view(batch.joint_state(), batch.x.astype(np.float32), interpreted))
 
-    @property
+    @cached_property
     def view(self) -> FlatView:
         """What the policy sees; x as a share of how far the module's tasks take a robot, where no places are said."""
         farthest = max(abs(end) for ends in self.module.contract.target_ranges.values() for end in ends)

@@ -48,7 +48,7 @@ def put_on_feet(batch: RobotBatch, rng: np.random.Generator) -> None:
     """A robot that has fallen is put on its feet where it lies: episode and belief go on."""
     fallen, x = batch.fallen, batch.x
     batch.reset(rng, fallen)
-    batch.qpos[fallen, batch.spec.root_addresses[0]] = x[fallen]
+    batch.place(x[fallen], who=fallen)
 
 
 def motion_of(batch: RobotBatch, before: Float[np.ndarray, "robot nq"]) -> Motion:
@@ -67,7 +67,7 @@ def no_command(size: int) -> Command:
 
 def tracker_features(batch: RobotBatch, reach: Reach) -> int:
     """Numbers that a tracker sees."""
-    return tracker_observation(batch.tracker_state(), no_command(batch.size), reach).shape[-1]
+    return tracker_observation(batch.proprioception(), no_command(batch.size), reach).shape[-1]
 
 
 def privileged_reward(

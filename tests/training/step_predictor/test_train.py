@@ -96,7 +96,7 @@ def test_a_transition_is_the_subgoal_its_choice_and_its_end(walk, batch, tracker
         held = jax.tree.map(np.copy, world.chase)
         np.testing.assert_array_equal(seen.next_observation, held.observation)
         sees = relative(held.subgoal, batch.x.astype(np.float32), batch.spec.pitch(batch.qpos).astype(np.float32))
-        expected = tracker_observation(batch.tracker_state(), sees, tracker.reach)
+        expected = tracker_observation(batch.proprioception(), sees, tracker.reach)
         np.testing.assert_allclose(held.observation, expected, atol=1e-4)
         assert not seen.terminal.any()
 

@@ -71,7 +71,7 @@ def test_rows_of_the_buffer_belong_together(batch, config, counted):
                 buffer.command.value[here] - buffer.motion.displacement[here], buffer.command.value[after], atol=1e-5
             )
     last = (seen - config.robots + np.arange(config.robots)) % config.replay
-    np.testing.assert_array_equal(buffer.next_joints[last], batch.tracker_state())
+    np.testing.assert_array_equal(buffer.next_joints[last], batch.proprioception())
     np.testing.assert_allclose(buffer.motion.pitch[last], batch.spec.pitch(batch.qpos), rtol=1e-6)
     for number in range(seen - config.replay, seen):
         moved[number % config.robots] += buffer.motion.displacement[number % config.replay]

@@ -128,7 +128,7 @@ def collect(
     tasks = meta.tasks.sample_episodes(task_key, config.robots, config.decisions, config.switch_share)
     tasks = jax.tree.map(np.asarray, tasks)
     batch.reset(rng)
-    batch.qpos[:, batch.spec.root_addresses[0]] = rng.uniform(-config.start, config.start, batch.size)
+    batch.place(rng.uniform(-config.start, config.start, batch.size))
     here, first = batch.spec.observe(batch.qpos, batch.qpos), jax.tree.map(lambda leaf: leaf[:, 0], tasks)
     known = begin_inference(encoder, here, first)
     states, beliefs, actions, rewards, steps = [here], [known.belief], [], [], []

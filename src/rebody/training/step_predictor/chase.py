@@ -92,7 +92,7 @@ def begin(batch: RobotBatch, reach: Reach, chooser: Chooser, config: StepPredict
     state = batch.spec.observe(batch.qpos, batch.qpos)
     unknown = Task(np.zeros(batch.size, np.int32), np.zeros(batch.size, np.float32))
     everyone = np.ones(batch.size, bool)
-    chase = give(chooser, batch.tracker_state(), state, unknown, everyone, reach, config.tasks, key)
+    chase = give(chooser, batch.proprioception(), state, unknown, everyone, reach, config.tasks, key)
     trail = np.repeat(batch.qpos[None], batch.spec.steps_per_decision + 1, axis=0)
     return World(jax.tree.map(np.array, chase), trail)
 
@@ -119,7 +119,7 @@ def advance(
     reward = pay(chase, world.observe(batch), fell, config.sac.discount)
     stand_up(world, batch, fell, rng)
     changes = fell | (rng.random(batch.size) < config.change_probability)
-    now, joints = world.observe(batch), batch.tracker_state()
+    now, joints = world.observe(batch), batch.proprioception()
     new = give(chooser, joints, now, chase.task, changes, tracker.reach, config.tasks, key)
     seen = SACBatch(chase.observation, chase.action, reward, new.observation, fell.astype(np.float32))
     transitions = jax.tree.map(lambda leaf: np.asarray(leaf)[ended], seen)

@@ -140,7 +140,7 @@ def measure(chooser: Chooser, tracker: Tracker, spec: RobotSpec, config: StepPre
         "relative error": np.mean((-seen.reward - STEP_COST * steps)[stood]),
         "falls per minute": 60 * np.sum(seen.terminal) / (config.held_out * config.held_out_s),
     }
-    slots = seen.observation[:, batch.tracker_state().shape[-1] :]  # one-hot, then the values
+    slots = seen.observation[:, batch.proprioception().shape[-1] :]  # one-hot, then the values
     for slot in SLOTS:
         figures[f"control steps, {FAMILIES[slot].name}"] = np.mean(steps[slots[:, slot] == 1])
     return {name: float(value) for name, value in figures.items()}

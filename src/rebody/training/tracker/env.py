@@ -37,22 +37,13 @@ class TrackerEnv(gymnasium.Env):
         self._command: Command | None = None
         self.action_space = spaces.Box(-1.0, 1.0, (self._spec.model.nu,), np.float32)
 
-    def __getstate__(self) -> dict[str, Any]:
-        # MuJoCo's batch cannot be copied; the numbers that it continues from can
-        return vars(self) | {"_batch": self._batch.state}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        self._batch = RobotBatch(self._spec, 1, threads=1)
-        self._batch.state = state["_batch"]
-
     @cached_property
     @own_jax_settings()
     def observation_space(self) -> spaces.Box:
         """Joint state, then the command."""
         nothing = Command(np.zeros(1, np.int32), np.zeros(1, np.float32))
         # the shape alone: a process in which JAX has computed cannot be forked any more
-        seen = jax.eval_shape(lambda told: _observation(self._batch.tracker_state(), told, self._config), nothing)
+        seen = jax.eval_shape(lambda told: _observation(self._batch.proprioception(), told, self._config), nothing)
         return spaces.Box(-np.inf, np.inf, seen.shape[1:], np.float32)
 
     @own_jax_settings()
@@ -93,7 +84,7 @@ class TrackerEnv(gymnasium.Env):
         return command
 
     def _observe(self, command: Command) -> np.ndarray:
-        joints = self._batch.tracker_state()
+        joints = self._batch.proprioception()
         return np.asarray(_observation(joints, command, self._config))[0]
 
 

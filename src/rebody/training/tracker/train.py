@@ -85,7 +85,7 @@ class TrackerLearner(Learner[World]):
 
     def row(self, batch: RobotBatch) -> ControlSteps:
         """What happened, whatever was asked for."""
-        joints, moved = batch.tracker_state()[:1], np.zeros(1, np.float32)
+        joints, moved = batch.proprioception()[:1], np.zeros(1, np.float32)
         action = np.zeros((1, self.spec.model.nu), np.float32)
         motion = Motion(moved, moved, moved, moved, np.zeros(1, bool), moved)
         return ControlSteps(joints, action, joints, motion, no_command(1))
@@ -106,10 +106,10 @@ class TrackerLearner(Learner[World]):
             if step % spec.steps_per_decision == 0:
                 follow_guides(orders, last.next(batch), config)
             push(batch, config, rng)
-            joints, before, command = batch.tracker_state(), batch.qpos.copy(), commands(orders, batch)
+            joints, before, command = batch.proprioception(), batch.qpos.copy(), commands(orders, batch)
             action = np.asarray(_explore(state.sac.actor, joints, command, action_key, config))
             batch.step(action)
-            seen = ControlSteps(joints, action, batch.tracker_state(), motion_of(batch, before), command)
+            seen = ControlSteps(joints, action, batch.proprioception(), motion_of(batch, before), command)
             state.replay.append(seen)
             begin_anew(state.world, batch, batch.fallen | (orders.age >= lasting.trajectory), rng)
         newest = state.replay.newest(config.steps * config.robots)
