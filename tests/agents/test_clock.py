@@ -93,7 +93,7 @@ def test_the_prediction_is_of_what_the_robot_sees_now(step_predictor, cheetah):
     steps = PredictedClock(step_predictor, (0,)).steps(batch, subgoal)
     pose = cheetah.pose(batch.qpos)
     np.testing.assert_array_equal(pose[:, 0], [0.0, 5.0, -3.0])
-    expected = step_predictor(batch.tracker_state(), relative(step_predictor.families, subgoal, pose))
+    expected = step_predictor(batch.proprioception(), relative(step_predictor.families, subgoal, pose))
     np.testing.assert_array_equal(steps, expected)
 
 

@@ -158,13 +158,13 @@ def test_a_batch_knows_its_pace(walker):
     batch.step(np.zeros((3, 6)))
     assert (np.sign(batch.pace) == np.sign(batch.x)).all()
     np.testing.assert_allclose(batch.pace, batch.x / walker.smoothing_s)
-    seen = batch.tracker_state()
+    seen = batch.proprioception()
     np.testing.assert_array_equal(seen[:, :-1], batch.joint_state())
     np.testing.assert_array_equal(seen[:, -1], batch.pace.astype(np.float32))
     twin.state = batch.state
     for robots in (batch, twin):
         robots.step(np.ones((3, 6)))
-    np.testing.assert_array_equal(twin.tracker_state(), batch.tracker_state())
+    np.testing.assert_array_equal(twin.proprioception(), batch.proprioception())
     batch.reset(np.random.default_rng(0), np.array([True, False, False]))
     np.testing.assert_array_equal(batch.pace, [0.0, *twin.pace[1:]])
 

@@ -130,8 +130,6 @@ class RobotBatch(Simulation):
         """The joint state, and the pace where there is one."""
         return self.spec.tracker_state(self.qpos, self.qvel, self.pace)
 
-    tracker_state = proprioception
-
     def observation(self):
         """qpos, then qvel."""
         return np.concatenate([self.qpos, self.qvel], axis=-1)

@@ -130,7 +130,7 @@ class FlatLearner(Learner[TaskInference]):
         """What a tracker of the robot would be told."""
         return commands_within(self.spec.reach, self.module.contract.families.beside(SHIPPED))
 
-    @property
+    @cached_property
     def view(self) -> FlatView:
         """What the policy sees; x as a share of how far the module's tasks take a robot, where no places are said."""
         farthest = max(max(box.largest) for box in self.module.contract.families.ranges.values())
