@@ -14,8 +14,9 @@ import numpy as np
 from rebody.agents.parts import load_flat, load_inference, load_tracker
 from rebody.bodies import load_robot
 from rebody.evaluation import Results, evaluate
-from rebody.evaluation.evaluate import Trial
 from rebody.evaluation.statistics import with_interval
+from rebody.evaluation.trial import Trial
+from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import read_tasks
 
 TASKS = Path(__file__).parent / "tasks"
@@ -34,10 +35,15 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     seeds = parser.parse_args().seeds
     module = load_inference("position")
-    toy = Trial("reuse", module, None, None)
+    toy = Trial("reuse", module, SHIPPED, None, None)
     show("point mass", toy, "position-toy.json", 1, [agent for agent in PARTS if agent != "flat"])
     cheetah = Trial(
-        "reuse", module, load_robot("cheetah"), load_tracker("tracker-cheetah"), flat=load_flat("flat-position-cheetah")
+        "reuse",
+        module,
+        SHIPPED,
+        load_robot("cheetah"),
+        load_tracker("tracker-cheetah"),
+        flat=load_flat("flat-position-cheetah"),
     )
     results = show("cheetah", cheetah, "position-cheetah.json", seeds, list(PARTS))
     print_share(results)
@@ -48,7 +54,7 @@ def show(body: str, trial: Trial, file: str, seeds: int, agents: list[str]) -> d
     print("| agent | parts | median error [m] | 95th percentile [m] | regret | fell [%] |\n|---|---|---|---|---|---|")
     results = {}
     for agent in agents:
-        results[agent] = evaluate(replace(trial, agent=agent), read_tasks(TASKS / file), seeds)
+        results[agent] = evaluate(replace(trial, agent=agent), read_tasks(TASKS / file, SHIPPED), seeds)
         summary = results[agent].summary
         goal = summary["families"]["goal"]
         cells = [cell(figures) for figures in (goal["median_error"], goal["p95_error"], summary["regret"])]

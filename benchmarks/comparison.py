@@ -16,11 +16,12 @@ from agents import cell
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, read_results, save_results
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.names import AGENTS
 from rebody.report.page import find, write_page
 from rebody.report.style import figure
 from rebody.store import load_artifact
+from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import read_tasks
 
 TASKS = Path(__file__).parent / "tasks"
@@ -87,7 +88,7 @@ def judge(trial: Trial, path: Path, seeds: int) -> Results:
     if path.exists():
         return read_results(path)
     assert trial.robot is not None
-    results = evaluate(trial, read_tasks(TASKS / f"goal-velocity-{trial.robot.name}.json"), seeds)
+    results = evaluate(trial, read_tasks(TASKS / f"goal-velocity-{trial.robot.name}.json", SHIPPED), seeds)
     save_results(results, path)
     return results
 

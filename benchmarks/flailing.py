@@ -38,8 +38,8 @@ class Flailing(Controller):
     def see(self, batch):
         return batch.joint_state()
 
-    def __call__(self, joints, x, pitch, subgoal, belief):
-        observation = FlatView(reach=10.0)(joints, x, belief)
+    def __call__(self, joints, pose, subgoal, belief):
+        observation = FlatView(reach=10.0)(joints, pose, belief)
         # a fresh draw at every control step, from what the robot feels
         key = jax.random.fold_in(self.key, (1e4 * joints[0, -1]).astype(np.int32))
         return self.actor.sample(observation, key)[0]
@@ -50,16 +50,18 @@ def main() -> None:
     print("| module | moved in 20 decisions, median [m] | " + " | ".join(f"{d} decisions" for d in DECISIONS) + " |")
     print("|---|---|" + "---|" * len(DECISIONS))
     for name, file in FILES.items():
-        module, specs = load_inference(name), read_tasks(TASKS / file)
-        tasks = active_tasks(specs, max(DECISIONS), DECISION_DT)
+        module = load_inference(name)
+        families = module.contract.families
+        specs = read_tasks(TASKS / file, families)
+        tasks = active_tasks(specs, families, max(DECISIONS), DECISION_DT)
         features = 17 + 1 + 2 * module.parts.module.encoder.latent
         actor = eqx.filter_jit(Actor)(features, spec.model.nu, FlatConfig().sac, jax.random.key(0))
         controller = Flailing(actor, jax.random.key(1))
         episodes = rollout_on_robot(
-            build_agent("flat", module), controller, spec, tasks, module.contract.reward, np.arange(len(specs))
+            build_agent("flat", module), controller, spec, tasks, families, np.arange(len(specs))
         )
         _, read = module.parts.probe(episodes.belief)
-        error = np.median(np.abs(np.asarray(read) - tasks.target), axis=1)
+        error = np.median(np.abs(np.asarray(read) - tasks.target)[..., 0], axis=1)
         moved = np.median(np.abs(np.asarray(episodes.state.x)[19]))
         cells = " | ".join(f"{error[d - 1]:.2f} m" for d in DECISIONS)
         print(f"| {name} | {moved:.2f} | {cells} |", flush=True)

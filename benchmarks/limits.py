@@ -30,7 +30,7 @@ def main() -> None:
     arguments = parser.parse_args()
     found = {(robot, name): errors_of(robot, name) for robot in arguments.robots for name in arguments.inference}
     show(found)
-    draw(found, load_inference(arguments.inference[0]).contract.target_ranges, arguments.out)
+    draw(found, load_inference(arguments.inference[0]).contract.families.ranges, arguments.out)
 
 
 def errors_of(robot: str, name: str) -> dict[str, dict[float, float]]:
@@ -38,7 +38,7 @@ def errors_of(robot: str, name: str) -> dict[str, dict[float, float]]:
     specs = tasks_within(load_robot(robot))
     errors: dict[str, dict[float, list[float]]] = {"goal": {}, "velocity": {}}
     for episode in evaluate(TrialOptions(robot=robot, inference=name).load(), specs, SEEDS).episodes:
-        errors[episode.family].setdefault(episode.target, []).append(episode.final_error)
+        errors[episode.family].setdefault(episode.target[0], []).append(episode.final_error)
     return {
         family: {target: float(np.median(of)) for target, of in sorted(by_target.items())}
         for family, by_target in errors.items()
@@ -47,10 +47,10 @@ def errors_of(robot: str, name: str) -> dict[str, dict[float, float]]:
 
 def tasks_within(spec: RobotSpec) -> list[TaskSpec]:
     """The grid, without speeds that the robot cannot run at."""
-    slowest, fastest = spec.reach.speed
-    goals = [TaskSpec("goal", sign * goal) for goal in GOALS for sign in (-1, 1)]
+    reached = dict(spec.reach)["velocity"]
+    goals = [TaskSpec("goal", (sign * goal,)) for goal in GOALS for sign in (-1, 1)]
     speeds = [sign * speed for speed in SPEEDS for sign in (-1, 1)]
-    return goals + [TaskSpec("velocity", speed) for speed in speeds if slowest <= speed <= fastest]
+    return goals + [TaskSpec("velocity", (each,)) for each in speeds if reached.low[0] <= each <= reached.high[0]]
 
 
 def show(found: dict[tuple[str, str], dict[str, dict[float, float]]]) -> None:
@@ -71,7 +71,7 @@ def draw(found: dict[tuple[str, str], dict[str, dict[float, float]]], learned: d
             for (robot, name), errors in found.items():
                 targets = list(errors[family])
                 axes.plot(targets, [errors[family][target] for target in targets], "o-", ms=3, label=f"{robot}, {name}")
-            axes.axvspan(*learned[family], color="#eeeeee", zorder=0)
+            axes.axvspan(learned[family].low[0], learned[family].high[0], color="#eeeeee", zorder=0)
             axes.set(xlabel=f"hidden {family} [{unit}]", ylabel=f"final error [{unit}]", yscale="log")
             axes.legend(frameon=False, fontsize=8)
 

@@ -16,12 +16,16 @@ from rebody.agents.parts import LoadedTracker, load_tracker
 from rebody.agents.rollout import follow
 from rebody.bodies import load_robot
 from rebody.report.style import figure
-from rebody.tasks import FAMILIES, JUMP, STAND, VELOCITY
+from rebody.tasks import SHIPPED
 from rebody.tasks.figures import final_error
 from rebody.training.tracker.report import run_robots
 from rebody.types import Subgoal, Task
 
-TOLD = {VELOCITY: np.arange(-4.0, 4.05, 0.1), STAND: np.arange(-1.5, 1.55, 0.05), JUMP: np.arange(0.2, 5.05, 0.1)}
+TOLD = {
+    "velocity": np.arange(-4.0, 4.05, 0.1),
+    "stand": np.arange(-1.5, 1.55, 0.05),
+    "jump": np.arange(0.2, 5.05, 0.1),
+}
 STARTS = 8
 
 Curve = dict[float, float]
@@ -38,17 +42,17 @@ def main() -> None:
     draw(found, arguments.out)
 
 
-def curves_of(loaded: LoadedTracker) -> dict[int, Curve]:
+def curves_of(loaded: LoadedTracker) -> dict[str, Curve]:
     """Of each slot but goals: a far goal is a speed."""
     spec, tracker = load_robot(loaded.robot), loaded.tracker
-    controller, curves = TrackerController(tracker, spec.goal_ahead), {}
+    controller, curves = TrackerController(tracker, goal_ahead=spec.goal_ahead), {}
     for slot, values in TOLD.items():
-        if FAMILIES[slot].name not in tracker.slots:
+        if slot not in tracker.families:
             continue
         told = np.repeat(values, STARTS).astype(np.float32)
-        command = Subgoal(np.full(len(told), slot, np.int32), told)
+        command = Subgoal(np.full(len(told), tracker.families.index(slot), np.int32), told[:, None])
         states, _ = run_robots(spec, len(told), lambda batch, command=command: follow(controller, batch, command))
-        errors = final_error(Task(command.slot, command.value), states).reshape(-1, STARTS)
+        errors = final_error(tracker.families, Task(command.slot, command.value), states).reshape(-1, STARTS)
         curves[slot] = dict(zip(values.round(2).tolist(), np.median(errors, axis=1).tolist(), strict=True))
     return curves
 
@@ -61,23 +65,24 @@ def held(curve: Curve, tolerance: float) -> list[tuple[float, float]]:
     return [(values[i], values[j]) for i, j in zip(begins, ends, strict=True)]
 
 
-def show(found: dict[str, dict[int, Curve]]) -> None:
+def show(found: dict[str, dict[str, Curve]]) -> None:
     """A Markdown table: what is held beside what was trained for."""
     print("| tracker | slot | trained for | held within the tolerance |\n|---|---|---|---|")
     for name, curves in found.items():
-        limits = load_tracker(name).tracker.reach.limits
+        families = load_tracker(name).tracker.families
         for slot, curve in curves.items():
-            family, trained = FAMILIES[slot], limits[FAMILIES[slot].name]
+            family = families.named(slot)
+            trained = family.range.low[0], family.range.high[0]
             ranges = ", ".join(f"{low:g} to {high:g}" for low, high in held(curve, family.tolerance))
             print(f"| {name} | {family.name} [{family.unit}] | {trained[0]:g} to {trained[1]:g} | {ranges} |")
 
 
-def draw(found: dict[str, dict[int, Curve]], out: Path) -> None:
+def draw(found: dict[str, dict[str, Curve]], out: Path) -> None:
     """A panel per slot that a tracker has, a line per tracker."""
     slots = [slot for slot in TOLD if any(slot in curves for curves in found.values())]
     with figure(out, 1, len(slots), size=(5.5 * len(slots), 4.2)) as (_, panels):
         for axes, slot in zip(np.atleast_1d(panels), slots, strict=True):
-            family = FAMILIES[slot]
+            family = SHIPPED.named(slot)
             for name, curves in found.items():
                 if slot in curves:
                     axes.plot(list(curves[slot]), list(curves[slot].values()), ".-", ms=4, label=name)

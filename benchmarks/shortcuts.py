@@ -17,8 +17,11 @@ import numpy as np
 
 from rebody.agents.parts import load_inference, load_tracker
 from rebody.bodies import load_robot
-from rebody.evaluation.evaluate import Trial, run_trial, start_seeds, trial_agent
+from rebody.evaluation.evaluate import run_trial, start_seeds, trial_agent
+from rebody.evaluation.trial import Trial
 from rebody.inference.probe import fit_probe
+from rebody.tasks import SHIPPED, FamilySet
+from rebody.tasks.line import GOAL
 from rebody.tasks.task_file import active_tasks, read_tasks
 from rebody.types import DECISION_DT, Belief
 
@@ -27,11 +30,11 @@ FROM = 20
 
 
 def main() -> None:
-    specs = read_tasks(TASKS)
-    target = np.array([spec.target for spec in specs])
+    specs = read_tasks(TASKS, SHIPPED)
+    target = np.array([spec.target[0] for spec in specs])
     latents, speeds = {}, {}
     for name, trial in trials().items():
-        tasks = active_tasks(specs, trial.decisions, DECISION_DT)
+        tasks = active_tasks(specs, trial.in_play, trial.decisions, DECISION_DT)
         episodes = run_trial(trial, trial_agent(trial, tasks), tasks, start_seeds(specs, np.zeros(len(specs), int)))
         latents[name] = np.asarray(episodes.belief.mean, float)[FROM:]
         speeds[name] = np.asarray(episodes.state.vx, float)[FROM:]
@@ -43,20 +46,21 @@ def main() -> None:
 def trials() -> dict[str, Trial]:
     """The toy, a toy of twice the mass, the cheetah."""
     module = load_inference("position")
-    toy = Trial("reuse", module, None, None)
+    toy = Trial("reuse", module, SHIPPED, None, None)
     heavier = eqx.tree_at(lambda t: t.mass, module.toy, 2.0 * module.toy.mass)
-    robot = Trial("reuse", module, load_robot("cheetah"), load_tracker("tracker-cheetah"))
+    robot = Trial("reuse", module, SHIPPED, load_robot("cheetah"), load_tracker("tracker-cheetah"))
     return {"toy": toy, "heavier toy": replace(toy, toy=heavier), "cheetah": robot}
 
 
 def print_targets(latents: dict[str, np.ndarray], target: np.ndarray) -> None:
     shape = latents["toy"].shape[:2]
     wanted = np.broadcast_to(target, shape)
-    probe = fit_probe(latents["toy"].reshape(-1, latents["toy"].shape[-1]), np.zeros(wanted.size, int), wanted.ravel())
+    known = latents["toy"].reshape(-1, latents["toy"].shape[-1])
+    probe = fit_probe(FamilySet((GOAL,)), known, np.zeros(wanted.size, int), wanted.reshape(-1, 1))
     print("| body | target read by the toy's probe: R2 | median error [m] |\n|---|---|---|")
     for name, latent in latents.items():
         _, read = probe(Belief(jnp.asarray(latent, jnp.float32), jnp.zeros(latent.shape)))
-        error = np.asarray(read) - wanted
+        error = np.asarray(read)[..., 0] - wanted
         print(f"| {name} | {1 - np.var(error) / np.var(wanted):.6f} | {np.median(np.abs(error)):.4f} |")
 
 
@@ -68,7 +72,8 @@ def print_bodies(latents: dict[str, np.ndarray], target: np.ndarray) -> None:
         body = np.broadcast_to(np.arange(len(names))[:, None, None], features.shape[:3])
         fitted, tried = features[:, :, ::2], features[:, :, 1::2]
         size = features.shape[-1]
-        probe = fit_probe(fitted.reshape(-1, size), body[:, :, ::2].ravel(), np.zeros(body[:, :, ::2].size))
+        kinds = FamilySet(tuple(replace(GOAL, name=name.replace(" ", "_")) for name in names))
+        probe = fit_probe(kinds, fitted.reshape(-1, size), body[:, :, ::2].ravel(), np.zeros((body[:, :, ::2].size, 1)))
         said, _ = probe(Belief(jnp.asarray(tried, jnp.float32), jnp.zeros(tried.shape)))
         right = np.mean(np.asarray(said) == body[:, :, 1::2])
         print(f"| {', '.join(names)} | {100 * right:.1f} % | {100 / len(names):.1f} % |")

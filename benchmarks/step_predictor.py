@@ -12,6 +12,7 @@ from pathlib import Path
 
 from rebody.cli.trial import TrialOptions
 from rebody.evaluation import Results, evaluate
+from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import read_tasks
 
 TASKS = Path(__file__).parent / "tasks" / "goal-velocity-cheetah.json"
@@ -25,7 +26,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--step-predictor", default="step-predictor-cheetah")
     options = parser.parse_args()
-    specs = read_tasks(options.tasks)
+    specs = read_tasks(options.tasks, SHIPPED)
     trials = {
         f"thesis mode, stride {stride}": TrialOptions(
             seconds=options.seconds, thesis=True, stride=stride, step_predictor=options.step_predictor

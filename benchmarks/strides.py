@@ -15,9 +15,11 @@ import numpy as np
 
 from rebody.agents.parts import load_inference, load_tracker
 from rebody.bodies import load_robot
-from rebody.evaluation.evaluate import Trial, run_trial, start_seeds, trial_agent
+from rebody.evaluation.evaluate import run_trial, start_seeds, trial_agent
 from rebody.evaluation.summary import percentile_95, with_interval
+from rebody.evaluation.trial import Trial
 from rebody.report.style import BELIEF, MOTION, figure
+from rebody.tasks import SHIPPED
 from rebody.tasks.figures import final_error
 from rebody.tasks.task_file import TaskSpec, active_tasks, read_tasks
 from rebody.types import DECISION_DT, Task
@@ -33,7 +35,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--out", type=Path, default=Path("docs/position"))
     options = parser.parse_args()
-    specs = [spec for spec in read_tasks(options.tasks) for _ in range(options.seeds)]
+    specs = [spec for spec in read_tasks(options.tasks, SHIPPED) for _ in range(options.seeds)]
     seeds = np.tile(np.arange(options.seeds), len(specs) // options.seeds)
 
     measured = {}
@@ -48,24 +50,24 @@ def main() -> None:
 def trials() -> dict[str, Trial]:
     """Thesis mode at each stride, and our mode."""
     robot, tracker = load_robot("cheetah"), load_tracker("tracker-cheetah")
-    parts = load_inference("position-thesis"), robot, tracker
+    parts = load_inference("position-thesis"), SHIPPED, robot, tracker
     thesis = {
         f"thesis mode, stride {stride}": Trial("reuse", *parts, seconds=seconds, stride=stride, horizon=1, thesis=True)
         for stride, seconds in SECONDS.items()
     }
-    return thesis | {"our mode": Trial("reuse", load_inference("position"), robot, tracker)}
+    return thesis | {"our mode": Trial("reuse", load_inference("position"), SHIPPED, robot, tracker)}
 
 
 def measure(trial: Trial, specs: list[TaskSpec], seeds: np.ndarray) -> dict[str, np.ndarray]:
     """Error [m], oscillation [m] and settling time [s, infinite if never] of each episode."""
-    tasks = active_tasks(specs, trial.decisions, DECISION_DT)
+    tasks = active_tasks(specs, trial.in_play, trial.decisions, DECISION_DT)
     episodes = run_trial(trial, trial_agent(trial, tasks), tasks, start_seeds(specs, seeds))
-    x, target = np.asarray(episodes.state.x, float), np.array([spec.target for spec in specs])
+    x, target = np.asarray(episodes.state.x, float), np.array([spec.target[0] for spec in specs])
     outside = np.abs(x - target) > WITHIN
     last_outside = len(x) - 1 - np.argmax(outside[::-1], axis=0)
     settled = np.where(outside.any(0), DECISION_DT * (last_outside + 2), DECISION_DT)
     return {
-        "error": final_error(Task(tasks.family[-1], tasks.target[-1]), episodes.state),
+        "error": final_error(trial.in_play, Task(tasks.family[-1], tasks.target[-1]), episodes.state),
         "oscillation": x[-len(x) // 5 :].std(axis=0),
         "settled": np.where(outside[-1], np.inf, settled),
         "fell": np.asarray(episodes.fell),

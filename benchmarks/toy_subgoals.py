@@ -14,7 +14,8 @@ from rebody.agents.parts import load_inference, load_tracker
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, load_robot
 from rebody.evaluation import evaluate
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
+from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import Subgoal
 
@@ -29,10 +30,10 @@ def main() -> None:
     print("| horizon [decisions] | lag [s] | mean error after that shift [m] | final error [m], median |")
     print("|---|---|---|---|")
     for horizon in HORIZONS:
-        trial = Trial("reuse", inference, None, None, horizon=horizon)
-        episodes = evaluate(trial, [TaskSpec("goal", float(goal)) for goal in GOALS], 1).episodes
+        trial = Trial("reuse", inference, SHIPPED, None, None, horizon=horizon)
+        episodes = evaluate(trial, [TaskSpec("goal", (float(goal),)) for goal in GOALS], 1).episodes
         toy = np.array([episode.quantities["x"] for episode in episodes]).T
-        robot = play(np.array([episode.subgoal for episode in episodes]).T, spec, controller)
+        robot = play(np.array([episode.subgoal for episode in episodes])[..., 0].T, spec, controller)
         errors = [shifted_error(toy, robot, lag, spec.control_dt) for lag in LAGS_S]
         best = int(np.argmin(errors))
         final = np.median(np.abs(robot[-40:].mean(0) - toy[-1]))
@@ -45,7 +46,7 @@ def play(subgoals: np.ndarray, spec, controller) -> np.ndarray:
     batch.reset(np.random.default_rng(0))
     positions = []
     for values in subgoals.astype(np.float32):
-        subgoal = Subgoal(np.zeros(len(values), np.int32), values)
+        subgoal = Subgoal(np.zeros(len(values), np.int32), values[:, None])
         for _ in range(spec.steps_per_decision):
             follow(controller, batch, subgoal)
             positions.append(batch.x)

@@ -17,8 +17,9 @@ from agents import cell
 from rebody.agents.parts import load_inference
 from rebody.bodies.toys import Toy
 from rebody.evaluation import evaluate
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.report.style import BELIEF, MOTION, figure
+from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import read_tasks
 
 TASKS = Path(__file__).parent / "tasks"
@@ -36,8 +37,8 @@ def main() -> None:
     )
     measured = {}
     for module, changes in CHANGES.items():
-        trial = Trial("reuse", load_inference(module), None, None)
-        specs = read_tasks(TASKS / FILES[module])
+        trial = Trial("reuse", load_inference(module), SHIPPED, None, None)
+        specs = read_tasks(TASKS / FILES[module], SHIPPED)
         for change in changes:
             for factor in FACTORS:
                 toy = scaled(trial.inference.toy, change, factor)

@@ -22,11 +22,10 @@ import jax
 import numpy as np
 
 import rebody  # noqa: F401 (registers the environment)
-from rebody.agents.clock import place
 from rebody.bodies import RobotBatch, load_robot
-from rebody.control.tracker import relative, tracker_observation
+from rebody.control.command import relative
+from rebody.control.tracker import tracker_observation
 from rebody.report.style import figure
-from rebody.tasks import GOAL, VELOCITY
 from rebody.tasks.figures import final_error
 from rebody.training import off_policy
 from rebody.training.tracker import tracker_preset
@@ -38,6 +37,7 @@ ENVIRONMENT = "rebody/HalfCheetahTracker-v0"
 SPEC = load_robot("cheetah")
 CONFIG = tracker_preset(SPEC)
 COMMANDS = CONFIG.held_out
+FAMILIES = CONFIG.families.only(("goal", "velocity"))
 Predict = Callable[[np.ndarray], np.ndarray]
 
 
@@ -63,23 +63,23 @@ class Clock:
 
 
 @jax.jit
-def _observe(joints, subgoal: Subgoal, x, pitch):
-    return tracker_observation(joints, relative(subgoal, x, pitch), CONFIG.reach)
+def _observe(joints, subgoal: Subgoal, pose):
+    return tracker_observation(joints, relative(CONFIG.families, subgoal, pose), CONFIG.families)
 
 
 def errors(predict: Predict) -> dict[str, float]:
     """Median errors on held-out goals and speeds."""
-    rng, reach = np.random.default_rng(2**31 - 1), CONFIG.reach
-    value = [rng.uniform(-reach.distance, reach.distance, COMMANDS), speeds_within(reach, COMMANDS, rng)]
-    slot = np.repeat([GOAL, VELOCITY], COMMANDS).astype(np.int32)
-    subgoal = Subgoal(slot, np.concatenate(value).astype(np.float32))
+    rng, (goal, velocity) = np.random.default_rng(2**31 - 1), FAMILIES
+    value = [rng.uniform(goal.range.low[0], goal.range.high[0], COMMANDS), speeds_within(velocity.range, COMMANDS, rng)]
+    slot = np.repeat([CONFIG.families.index(family.name) for family in FAMILIES], COMMANDS).astype(np.int32)
+    subgoal = Subgoal(slot, np.concatenate(value).astype(np.float32)[:, None])
 
     def control_step(batch: RobotBatch) -> None:
-        batch.step(predict(np.asarray(_observe(batch.proprioception(), subgoal, *place(batch)))))
+        batch.step(predict(np.asarray(_observe(batch.proprioception(), subgoal, batch.pose().astype(np.float32)))))
 
     states, _ = run_robots(SPEC, len(slot), control_step)
-    found = final_error(Task(slot, subgoal.value), states)
-    return {"goal": float(np.median(found[slot == GOAL])), "velocity": float(np.median(found[slot == VELOCITY]))}
+    found = final_error(CONFIG.families, Task(slot, subgoal.value), states)
+    return {name: float(np.median(found[slot == CONFIG.families.index(name)])) for name in FAMILIES.names}
 
 
 def learn_ours(clock: Clock, seed: int) -> None:

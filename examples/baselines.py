@@ -10,15 +10,17 @@ import numpy as np
 from stable_baselines3 import SAC
 
 from rebody.envs import BeliefObservation
-from rebody.tasks import BaseTask
+from rebody.ranges import interval
+from rebody.tasks import FamilySet
+from rebody.tasks.line import GOAL
 
-HIDDEN_GOALS = (BaseTask("goal", -5.0, 5.0),)  # m
+HIDDEN_GOALS = FamilySet((GOAL.within(interval(-5.0, 5.0), law="plain"),))  # m
 STEPS = 4000  # of 0.1 s
 
 
 def believing_point_mass() -> gymnasium.Env:
     """Where it is, how fast, and what is believed of a hidden goal; it is paid by its distance."""
-    env = gymnasium.make("rebody/PointMass-v0", base_tasks=HIDDEN_GOALS)
+    env = gymnasium.make("rebody/PointMass-v0", families=HIDDEN_GOALS)
     return BeliefObservation(env, "position", control_dt=0.1)
 
 

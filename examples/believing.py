@@ -15,8 +15,8 @@ def walk(goal: float, seconds: float = 10.0) -> tuple[float, float]:
     env = BeliefObservation(gymnasium.make("rebody/PointMass-v0"), "position", control_dt=0.1)
     observation, _ = env.reset(options={"family": "goal", "target": goal})
     for _ in range(round(10 * seconds)):
-        observation, *_ = env.step(np.clip([env.reading.target - observation[0]], -1.0, 1.0))
-    return observation[0], env.reading.target
+        observation, *_ = env.step(np.clip(env.reading.target - observation[:1], -1.0, 1.0))
+    return observation[0], env.reading.target[0]
 
 
 if __name__ == "__main__":

@@ -32,6 +32,6 @@ def drive(tasks: Sequence[tuple[str, float]] = TASKS, seconds: float = 8.0) -> I
 
 
 if __name__ == "__main__":
-    for time, (family, target), (believed, amount), x, vx in drive():
+    for time, (family, target), (believed, (amount,)), x, vx in drive():
         tasks = f"hidden: {family:8} {target:5.1f}   believed: {believed:8} {amount:5.2f}"
         print(f"{time:4.0f} s   {tasks}   at {x:5.2f} m, {vx:5.2f} m/s")

@@ -25,21 +25,27 @@ import pytest  # noqa: E402
 from rebody.agents.configs import InferenceSettings  # noqa: E402
 from rebody.agents.parts import Inference, LoadedFlat, LoadedTracker, inference_template  # noqa: E402
 from rebody.bodies import load_robot  # noqa: E402
-from rebody.bodies.robot import Reach  # noqa: E402
 from rebody.bodies.toys import MassDamper  # noqa: E402
 from rebody.cli.main import run  # noqa: E402
 from rebody.control.flat import FlatPolicy, FlatView  # noqa: E402
 from rebody.control.sac import Actor, SACConfig  # noqa: E402
 from rebody.control.step_predictor import StepPredictor  # noqa: E402
 from rebody.control.tracker import Tracker  # noqa: E402
-from rebody.evaluation.evaluate import Trial  # noqa: E402
+from rebody.evaluation.trial import Trial  # noqa: E402
 from rebody.inference.contract import Contract  # noqa: E402
 from rebody.inference.probe import Probe  # noqa: E402
+from rebody.ranges import interval  # noqa: E402
 from rebody.store import tree_hash  # noqa: E402
 from rebody.store.typed import typed  # noqa: E402
+from rebody.tasks import SHIPPED, FamilySet  # noqa: E402
+from rebody.tasks.line import GOAL, VELOCITY  # noqa: E402
 
 WINDOW, SECONDS = 6, 3.0
 JOINTS, ACTIONS = 17, 6  # of a cheetah
+HEARD = FamilySet((GOAL.within(interval(-10.0, 10.0), law="plain"),))
+"""What the tiny module tells apart."""
+COMMANDS = FamilySet((GOAL.within(interval(-5.0, 5.0)), VELOCITY.within(interval(-3.0, 3.0))))
+"""What the tiny tracker can be commanded to do."""
 
 MAPS = Path("/proc/self/maps")
 MOST_MAPS = 20_000
@@ -61,7 +67,7 @@ def _few_memory_maps() -> Iterator[None]:
 def stored_config():
     """What an inference artifact's config.json says of its parts."""
     return {
-        "contract": asdict(Contract(("x",), WINDOW, {"goal": (-10.0, 10.0)}, "plain")),
+        "contract": asdict(Contract(("x",), WINDOW, HEARD)),
         "inference": {"units": 8, "window": WINDOW, "latent": 2},
         "high_level": {"fields": ["x", "vx"], "scales": [10.0, 3.5], "hidden": [8], "projections": 0},
         "toy": {"kind": "mass-damper", "mass": 1.0, "damping": 2.0, "max_force": 7.0},
@@ -73,7 +79,7 @@ def inference(stored_config):
     settings = typed(stored_config, InferenceSettings)
     parts = eqx.filter_jit(lambda: inference_template(settings))()
     weights = [parts.high_level.actor.net.mlp.weights[-1], parts.told_policy.actor.net.mlp.weights[-1]]
-    probe = Probe(np.zeros(1, np.int32), np.zeros((3, 1), np.float32), np.array([[2.0], [-1.0], [0.5]], np.float32))
+    probe = Probe(np.zeros((3, 1), np.float32), np.array([[2.0], [-1.0], [0.5]], np.float32), HEARD)
     parts = eqx.tree_at(
         lambda p: (p.high_level.actor.net.mlp.weights[-1], p.told_policy.actor.net.mlp.weights[-1], p.probe),
         parts,
@@ -94,7 +100,7 @@ def lively_actor(observations: int, seed: int, actions: int = ACTIONS) -> Actor:
 
 @pytest.fixture(scope="session")
 def tracker():
-    return Tracker(lively_actor(JOINTS + 6, 1), Reach(speed=(-3.0, 3.0)))
+    return Tracker(lively_actor(JOINTS + 6, 1), COMMANDS)
 
 
 @pytest.fixture(scope="session")
@@ -104,7 +110,7 @@ def flat_policy():
 
 @pytest.fixture(scope="session")
 def step_predictor(tracker):
-    return StepPredictor(lively_actor(JOINTS + 6, 3, actions=1), tracker.reach)
+    return StepPredictor(lively_actor(JOINTS + 6, 3, actions=1), tracker.families)
 
 
 @pytest.fixture(scope="session")
@@ -128,6 +134,7 @@ def trial(inference, tracker, flat_policy, cheetah):
     return Trial(
         agent="reuse",
         inference=inference,
+        families=SHIPPED,
         robot=cheetah,
         tracker=LoadedTracker("tiny-tracker", "cheetah", tracker),
         flat=LoadedFlat("tiny-flat", "cheetah", tree_hash(inference.parts.module), flat_policy),

@@ -21,7 +21,8 @@ for pair in sys.argv[1:]:
     name, value = pair.split("=")
     jax.config.update(name, {"True": True, "False": False}.get(value, value))
 import gymnasium, rebody
-env = gymnasium.make("rebody/HalfCheetah-v0", reward="relative")
+module = rebody.load_inference("goal-velocity")
+env = gymnasium.make("rebody/HalfCheetah-v0", families=module.contract.families)
 toy = gymnasium.make_vec("rebody/PointMass-v0", num_envs=2, vectorization_mode="vector_entry_point")
 agent = rebody.load_agent()
 observation, info = env.reset(seed=1)
@@ -29,7 +30,7 @@ print(info["family"], info["target"], toy.reset(seed=3)[1]["target"])
 reward = 0.0
 for _ in range(12):
     observation, reward, *_ = env.step(agent.step(observation, reward))
-belief = rebody.load_inference("goal-velocity").begin({"x": 0.0})
+belief = module.begin({"x": 0.0})
 print(observation.round(4).tolist(), agent.inferred, belief.update({"x": 0.1}, -0.9).target)
 print(toy.step(toy.action_space.sample() * 0 + 0.5)[0].tolist(), agent.status.mode)
 """

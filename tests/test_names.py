@@ -2,15 +2,16 @@
 
 from rebody import names
 from rebody.agents.kinds import KINDS
-from rebody.evaluation.evaluate import POINT_MASS
+from rebody.evaluation.trial import POINT_MASS
 from rebody.report.thesis import FIGURES
 from rebody.store import load_artifact, shipped_artifacts
-from rebody.tasks import FAMILIES
+from rebody.tasks import SHIPPED
 from rebody.training.inference import PRESETS
 
 
 def test_families():
-    assert {family.name: f"{family.unit}, solved within {family.tolerance:g}" for family in FAMILIES} == names.FAMILIES
+    lines = {each.name: f"{each.label}: {each.unit}, solved within {each.tolerance:g}" for each in SHIPPED}
+    assert list(names.families().items()) == list(lines.items())
 
 
 def test_agents():

@@ -7,7 +7,7 @@ import pytest
 
 from rebody.bodies import load_robot
 from rebody.errors import RebodyError
-from rebody.ranges import Count, Layers, Share, _fields_of, _numbers, check_ranges
+from rebody.ranges import Box, Count, Layers, Share, _fields_of, _numbers, check_ranges, interval
 from rebody.training.classifier import ClassifierConfig
 from rebody.training.flat import FlatConfig
 from rebody.training.high_level import HighLevelConfig
@@ -93,5 +93,46 @@ class Outer:
 def test_messages_name_the_option_its_range_and_the_value(settings, says):
     check_ranges(Outer())
     check_ranges(replace(Outer(), length=3, inner=Inner(pair=(0.0, 1.0))))
+    with pytest.raises(RebodyError, match=says):
+        check_ranges(settings)
+
+
+def test_a_box_has_a_smallest_and_a_largest_of_each_number():
+    box = Box((-3.0, 1.0), (2.0, 4.0))
+    assert (box.size, box.largest) == (2, (3.0, 4.0))
+    assert interval(-1.0, 2.0) == Box((-1.0,), (2.0,))
+    assert interval(2.0, 2.0).largest == (2.0,)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "says"),
+    [
+        ((), (), "low and high must be as many numbers each, at least one"),
+        ((1.0,), (1.0, 2.0), "low and high must be as many numbers each"),
+        ((1.0, 2.0), (3.0, 1.0), r"from \[1.0, 2.0\] to \[3.0, 1.0\] there is nothing"),
+        ((float("nan"),), (1.0,), "there is nothing"),
+    ],
+)
+def test_a_box_that_holds_nothing_is_refused(low, high, says):
+    with pytest.raises(ValueError, match=says):
+        Box(low, high)
+
+
+@dataclass(frozen=True)
+class Boxed:
+    box: Box = field(default_factory=lambda: interval(-1.0, 1.0))
+    boxes: tuple[Box, ...] = ()
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        (Boxed(box=Box((-1.0, -2e6), (1.0, 1.0))), r"^--box\.low must be at least -1e\+06"),
+        (Boxed(box=interval(1.0, np.inf)), r"^--box\.high must be at least -1e\+06"),
+        (Boxed(boxes=(interval(0.0, 1.0), interval(0.0, 2e6))), r"^--boxes\.1\.high must be"),
+    ],
+)
+def test_ends_of_boxes_have_ranges(settings, says):
+    check_ranges(Boxed(boxes=(interval(0.0, 1.0),)))
     with pytest.raises(RebodyError, match=says):
         check_ranges(settings)

@@ -1,6 +1,7 @@
 """The one exception that users are meant to see."""
 
 import difflib
+import re
 from collections.abc import Iterable
 
 
@@ -16,7 +17,8 @@ def unknown(kind: str, name: object, known: Iterable[str], more: str = "") -> Re
     known = list(known)
     guess = did_you_mean(str(name), known)
     listed = ", ".join([*known, more] if more else known)
-    return RebodyError(f"unknown {kind} '{name}'.{guess} {kind.capitalize()}s are: {listed}.")
+    plural = re.sub("(?<![aeiou])y$", "ie", kind) + "s"
+    return RebodyError(f"unknown {kind} '{name}'.{guess} {plural.capitalize()} are: {listed}.")
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -1,8 +1,7 @@
 """What can be asked for by name, with a line about each: all that `rebody list` prints.
 
 Importing this loads no library, so that a list or a help costs nothing. Agents and figures are described here and
-nowhere else; families are described where they are defined, and a test compares; presets and commands are described by
-their docstrings, which are read from the source.
+nowhere else; families, presets and commands where they are defined, which is read from the source.
 """
 
 import ast
@@ -11,15 +10,10 @@ from pathlib import Path
 POINT_MASS = "point-mass"
 ROBOTS = Path(__file__).parent / "bodies" / "robots"
 ARTIFACTS = Path(__file__).parent / "artifacts"
+FAMILIES = (Path(__file__).parent / "tasks" / "line.py",)
+"""Files whose top level has the families that ship."""
 PRESETS = Path(__file__).parent / "training" / "inference" / "presets.py"
 
-FAMILIES = {
-    "goal": "m, solved within 0.25",
-    "velocity": "m/s, solved within 0.25",
-    "stand": "rad, solved within 0.2",
-    "jump": "m/s, solved within 0.4",
-}
-"""Families of tasks: unit of the target, and tolerance."""
 AGENTS = {
     "reuse": "the frozen module and the frozen policy of the toy",
     "retrain": "the frozen module, and a high-level policy that was learned on the robot",
@@ -61,6 +55,24 @@ FIGURES = {
 def shipped_robots() -> tuple[str, ...]:
     """Names of the robots that come with the package."""
     return tuple(sorted(path.stem for path in ROBOTS.glob("*.toml")))
+
+
+def families() -> dict[str, str]:
+    """Families of tasks that ship: what each asks for, the unit of its targets, and the tolerance."""
+    nodes = [
+        node.value for source in FAMILIES for node in ast.parse(source.read_text()).body if isinstance(node, ast.Assign)
+    ]
+    made = [node for node in nodes if isinstance(node, ast.Call) and ast.unparse(node.func) == "Family"]
+    lines = {}
+    for call in made:
+        said = {keyword.arg: keyword.value for keyword in call.keywords}
+        quantity = said["quantity"]
+        assert isinstance(quantity, ast.Call)
+        name, label, unit, tolerance = map(
+            ast.literal_eval, (said["name"], said["label"], quantity.args[2], said["tolerance"])
+        )
+        lines[name] = f"{label}: {unit}, solved within {tolerance:g}"
+    return lines
 
 
 def presets() -> dict[str, str]:

@@ -7,7 +7,7 @@ it. Upper ends are far beyond what makes sense: they keep slips of the finger fr
 import math
 import sys
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -49,6 +49,36 @@ Port = Annotated[int, Meta(ge=0, le=65_535)]
 """0 for any that is free."""
 Seed = Annotated[int, Meta(ge=0, lt=2**32)]
 """Random numbers know 32 bits of it: two that differ by 2^32 would be the same."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A range of vectors: the smallest and the largest of each number; ValueError where there is none between."""
+
+    low: tuple[Finite, ...]
+    high: tuple[Finite, ...]
+
+    def __post_init__(self):
+        """ValueError for ends that are none."""
+        if not self.low or len(self.low) != len(self.high):
+            raise ValueError("low and high must be as many numbers each, at least one")
+        if not all(low <= high for low, high in zip(self.low, self.high, strict=True)):
+            raise ValueError(f"from {list(self.low)} to {list(self.high)} there is nothing")
+
+    @property
+    def size(self) -> int:
+        """How many numbers a vector has."""
+        return len(self.low)
+
+    @property
+    def largest(self) -> tuple[float, ...]:
+        """The largest |number| of each axis."""
+        return tuple(max(abs(low), abs(high)) for low, high in zip(self.low, self.high, strict=True))
+
+
+def interval(low: float, high: float) -> Box:
+    """A box of one axis."""
+    return Box((low,), (high,))
 
 
 def check_ranges(settings: Any) -> None:

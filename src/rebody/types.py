@@ -61,11 +61,15 @@ def global_state(**fields: Float[AnyArray, "*batch"]) -> GlobalState:
     return GlobalState(**(values | fields))
 
 
-class Task(eqx.Module):
-    """What to do, never told to an agent: a family and one signed number."""
+Pose = Float[AnyArray, "*batch 6"]
+"""The fields of `POSE_FIELDS` at one moment, in their order [m, rad]."""
 
-    family: Int[AnyArray, "*batch"]  # index into `rebody.tasks.FAMILIES`
-    target: Float[AnyArray, "*batch"]  # m, m/s or rad
+
+class Task(eqx.Module):
+    """What to do, never told to an agent: a family and a target."""
+
+    family: Int[AnyArray, "*batch"]  # index into a `rebody.tasks.FamilySet`
+    target: Float[AnyArray, "*batch axis"]  # in the units of its quantity, zeros behind its size
 
 
 class Transition(eqx.Module):
@@ -90,8 +94,8 @@ class Belief(eqx.Module):
 class Subgoal(eqx.Module):
     """A scaled one-hot (thesis 5.6.2): the chosen slot beside its value, since a value may be 0.
 
-    A goal is a point in the world, never relative to the robot.
+    A place is a point in the world, never relative to the robot.
     """
 
-    slot: Int[AnyArray, "*batch"]  # index into `rebody.tasks.FAMILIES`
-    value: Float[AnyArray, "*batch"]  # m (in the world), m/s or rad
+    slot: Int[AnyArray, "*batch"]  # index into a `rebody.tasks.FamilySet`
+    value: Float[AnyArray, "*batch axis"]  # in the units of its quantity, zeros behind its size

@@ -1,5 +1,7 @@
 """A belief that is told state and reward from outside is the agent's own."""
 
+from dataclasses import asdict, replace
+
 import equinox as eqx
 import jax
 import numpy as np
@@ -12,8 +14,10 @@ from rebody.agents.parts import Inference, inference_template
 from rebody.agents.rollout import rollout_on_toy
 from rebody.bodies.toys import MassDamper
 from rebody.errors import RebodyError
+from rebody.ranges import Box
 from rebody.store.typed import typed
-from rebody.tasks import GOAL
+from rebody.tasks import Direction, FamilySet, Quantity
+from rebody.tasks.line import GOAL
 from rebody.types import ANGLES, Task
 
 DECISIONS = 9
@@ -32,10 +36,9 @@ def module_of(stored_config, *fields, **contract):
 
 @pytest.fixture(scope="module")
 def episodes(inference):
-    target = np.full((DECISIONS, 1), 4.0, np.float32)
-    task = Task(np.full(target.shape, GOAL, np.int32), target)
+    task = Task(np.zeros((DECISIONS, 1), np.int32), np.full((DECISIONS, 1, 1), 4.0, np.float32))
     agent = build_agent("reuse", inference, horizon=2)
-    episodes = rollout_on_toy(agent, inference.toy, task, "plain")
+    episodes = rollout_on_toy(agent, inference.toy, task, inference.contract.families)
     return jax.tree.map(lambda leaf: np.asarray(leaf)[:, 0], (episodes.state, episodes.reward, episodes.belief))
 
 
@@ -47,7 +50,9 @@ def test_believes_what_the_agent_did(inference, episodes):
         np.testing.assert_allclose(reading.latent.mean, of_agent.mean[i], atol=1e-5)
         np.testing.assert_allclose(reading.latent.variance, of_agent.variance[i], atol=1e-5)
     assert (reading.family, reading.probabilities, reading.responsibilities) == ("goal", {"goal": 1.0}, {})
-    assert reading.target == pytest.approx(of_agent.mean[-1] @ [2.0, -1.0] + 0.5, abs=1e-4)
+    assert reading.target == (pytest.approx(of_agent.mean[-1] @ [2.0, -1.0] + 0.5, abs=1e-4),)
+    assert reading.base_tasks.keys() == {("goal", "back"), ("goal", "front")}
+    assert sum(reading.base_tasks.values()) == pytest.approx(1.0, abs=1e-5)
 
 
 def test_knows_nothing_at_the_beginning_and_each_is_its_own(inference):
@@ -81,11 +86,34 @@ def test_of_several_families_and_clusters():
     for i in range(1, 20):
         reading = belief.update({"x": 0.1 * i}, -abs(0.1 * i - 6.0) / 6.0)
     assert reading.family == "goal"
-    assert reading.target == pytest.approx(6.0, abs=0.5)
+    assert reading.target == (pytest.approx(6.0, abs=0.5),)
+    assert list(reading.base_tasks) == [(name, side) for name in ("goal", "velocity") for side in ("back", "front")]
+    assert reading.base_tasks["goal", "front"] > 0.9
     assert reading.probabilities.keys() == {"goal", "velocity"}
     assert reading.probabilities["goal"] > 0.9
     assert sum(reading.probabilities.values()) == pytest.approx(1.0, abs=1e-4)
     assert sum(reading.responsibilities.values()) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_of_places_with_a_heading(stored_config):
+    """Numbers as the family has them, sectors as base tasks, the heading whatever turn it is told in."""
+    sectors = tuple(Direction(name, (x, 0.0, y)) for name, x, y in (("east", 1.0, 0.0), ("north", 0.0, 1.0)))
+    quantity = Quantity("x_yaw_y", ("x", "yaw", "y"), "m, rad", "place and heading")
+    dock = replace(GOAL, name="dock", quantity=quantity, targets=(Box((-6.0,) * 3, (6.0,) * 3),), directions=sectors)
+    module = module_of(stored_config, "x", "y", "yaw", "yaw_rate", families=asdict(FamilySet((dock, GOAL))))
+    weights = np.random.default_rng(0).normal(size=(3, 5)).astype("f4")
+    sure = np.array([[0, 0], [0, 0], [9, 0]], np.float32)  # of the first family
+    parts = eqx.tree_at(lambda p: (p.probe.target_weights, p.probe.family_weights), module.parts, (weights, sure))
+    one, other = (replace(module, parts=parts).begin({"x": 0.0, "y": 0.0, "yaw": 3.1}) for _ in range(2))
+    reading = one.update({"x": 0.1, "y": 0.3, "yaw": -3.1}, -1.0)
+    again = other.update({"x": 0.1, "y": 0.3, "yaw": 2 * np.pi - 3.1}, -1.0)
+    np.testing.assert_allclose(reading.latent.mean, again.latent.mean, atol=1e-5)
+    assert (reading.family, len(reading.target)) == ("dock", 3)
+    x, sine, cosine, y = (reading.latent.mean @ weights[:2] + weights[2])[:4]
+    assert reading.target == pytest.approx((x, np.arctan2(sine, cosine), y), abs=1e-5)
+    assert list(reading.base_tasks) == [("dock", "east"), ("dock", "north"), ("goal", "back"), ("goal", "front")]
+    assert sum(reading.base_tasks.values()) == pytest.approx(1.0, abs=1e-4)
+    assert reading.probabilities["dock"] > 0.99
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from rebody.agents.build import build_agent
-from rebody.agents.clock import EvenClock, PredictedClock, place
+from rebody.agents.clock import EvenClock, PredictedClock
 from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import rollout_on_robot
 from rebody.bodies import RobotBatch
-from rebody.control.tracker import relative
-from rebody.tasks import GOAL
+from rebody.control.command import relative, slots_among
+from rebody.tasks import SHIPPED
 from rebody.types import Subgoal, Task
 
 DECISIONS = 12
@@ -26,9 +26,10 @@ def run(request, inference, tracker, cheetah):
     agent = build_agent(request.param, inference, horizon=1)
 
     def run(clock, which=slice(None)):
-        targets = np.tile(TARGETS[which], (DECISIONS, 1))
-        tasks = Task(np.full(targets.shape, GOAL, np.int32), targets)
-        return rollout_on_robot(agent, TrackerController(tracker), cheetah, tasks, "plain", SEEDS[which], None, clock)
+        targets = np.tile(TARGETS[which], (DECISIONS, 1))[..., None]
+        tasks, families = Task(np.zeros(targets.shape[:2], np.int32), targets), inference.contract.families
+        controller = TrackerController(tracker, families)
+        return rollout_on_robot(agent, controller, cheetah, tasks, families, SEEDS[which], None, clock)
 
     return run
 
@@ -41,12 +42,12 @@ class OwnStrides(PredictedClock):
 
 
 def test_a_prediction_that_is_always_the_same_is_a_fixed_stride(run, always):
-    predicted, even = run(PredictedClock(always(4))), run(EvenClock(4))
+    predicted, even = run(PredictedClock(always(4), (0,))), run(EvenClock(4))
     jax.tree.map(np.testing.assert_array_equal, predicted, even)
 
 
 def test_every_episode_ticks_at_its_own_times(run, step_predictor):
-    together = run(OwnStrides(step_predictor))
+    together = run(OwnStrides(step_predictor, (0,)))
     for i, stride in enumerate(STRIDES):
         alone = run(EvenClock(stride), slice(i, i + 1))
         for mine, other in (
@@ -67,7 +68,7 @@ def test_what_is_predicted_is_held(run, step_predictor):
             said.append(super().steps(batch, subgoal))
             return said[-1]
 
-    episodes = run(Spy(fickle))
+    episodes = run(Spy(fickle, (0,)))
     assert len(np.unique(said)) > 2
     changed = (np.diff(episodes.belief.mean, axis=0) != 0).any(axis=-1)
     ticks = np.zeros((2 * DECISIONS + 21, len(SEEDS)), bool)  # after each control step
@@ -88,8 +89,20 @@ def test_the_prediction_is_of_what_the_robot_sees_now(step_predictor, cheetah):
     batch = RobotBatch(cheetah, 3)
     batch.reset(np.random.default_rng(0))
     batch.qpos[:, 0] = (0.0, 5.0, -3.0)
-    subgoal = Subgoal(np.zeros(3, np.int32), np.array([0.1, 5.3, -3.5], np.float32))
-    steps = PredictedClock(step_predictor).steps(batch, subgoal)
-    x, pitch = place(batch)
-    np.testing.assert_array_equal(x, [0.0, 5.0, -3.0])
-    np.testing.assert_array_equal(steps, step_predictor(batch.proprioception(), relative(subgoal, x, pitch)))
+    subgoal = Subgoal(np.zeros(3, np.int32), np.array([[0.1], [5.3], [-3.5]], np.float32))
+    steps = PredictedClock(step_predictor, (0,)).steps(batch, subgoal)
+    pose = cheetah.pose(batch.qpos)
+    np.testing.assert_array_equal(pose[:, 0], [0.0, 5.0, -3.0])
+    expected = step_predictor(batch.proprioception(), relative(step_predictor.families, subgoal, pose))
+    np.testing.assert_array_equal(steps, expected)
+
+
+def test_subgoals_are_addressed_to_the_predictors_slots(step_predictor, cheetah):
+    """Whatever order the families in play have."""
+    batch, in_play = RobotBatch(cheetah, 2), SHIPPED.only(("stand", "velocity", "goal"))
+    value = np.array([[2.5], [0.2]], np.float32)
+    steps = PredictedClock(step_predictor, slots_among(in_play, step_predictor.families)).steps(
+        batch, Subgoal(np.array([1, 2], np.int32), value)
+    )
+    own = PredictedClock(step_predictor, (0, 1)).steps(batch, Subgoal(np.array([1, 0], np.int32), value))
+    np.testing.assert_array_equal(steps, own)

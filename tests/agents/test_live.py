@@ -1,5 +1,6 @@
 """An agent on a robot: bad input never reaches the joints, and never the belief."""
 
+import gymnasium
 import jax
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import rebody
 from rebody.agents.live import HOLD_S, LiveAgent
 from rebody.agents.parts import LoadedTracker
 from rebody.errors import RebodyError
-from rebody.tasks import VELOCITY
+from rebody.tasks.line import LINE
 
 NUMBERS = 18
 """In an observation of the cheetah."""
@@ -72,7 +73,8 @@ def test_a_sensor_that_drops_out_is_held_over_and_then_the_robot_stands_still(ob
     for _ in range(3):
         assert np.isfinite(agent.step(observation, reward)).all()
     assert agent.status.mode == "standing still"
-    assert (int(agent.subgoal.slot), float(agent.subgoal.value)) == (VELOCITY, 0.0)
+    slot, value = int(agent.subgoal.slot), agent.subgoal.value.tolist()
+    assert (slot, value) == (1, [0.0])  # a speed, which the tracker knows beside the module's goals
     np.testing.assert_array_equal(agent.belief.mean, believed)
     agent.step(good(8), -1.0)
     assert agent.status == agent.status.__class__("running", None, (), ())
@@ -121,8 +123,14 @@ def test_what_cannot_be_asked_for_is_said(agent_that):
         agent_that(on_bad_input="hold").step(spoilt(0, 4, np.nan), 0.0)
 
 
+def test_what_is_inferred_is_a_family_and_a_vector(agent_that):
+    agent = agent_that()
+    agent.step(good(0), None)
+    assert agent.inferred == ("goal", (pytest.approx(0.5),))  # what the tiny probe says of the prior
+
+
 def test_a_real_run_gives_no_doubts():
-    env = __import__("gymnasium").make("rebody/HalfCheetah-v0", reward="relative")
+    env = gymnasium.make("rebody/HalfCheetah-v0", families=LINE)
     agent = rebody.load_agent()
     observation, _ = env.reset(seed=0, options={"family": "velocity", "target": 2.0})
     reward = 0.0

@@ -1,5 +1,7 @@
 """From artifacts to parts: what is loaded acts as what was saved."""
 
+from dataclasses import asdict
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -8,15 +10,17 @@ import pytest
 
 from rebody.agents.configs import InferenceSettings
 from rebody.agents.parts import inference_template, load_flat, load_inference, load_step_predictor, load_tracker
-from rebody.bodies.robot import Reach
 from rebody.bodies.toys import FullToy, MassDamper, PositionToy, describe_toy
 from rebody.control.flat import FlatView
+from rebody.control.places import Place
 from rebody.errors import RebodyError
 from rebody.store import save_artifact, tree_hash, tree_to_arrays
 from rebody.store.typed import typed
+from rebody.tasks.line import GOAL, VELOCITY
 
 X = np.linspace(-3, 3, 5, dtype=np.float32)
 SLOTS = ("goal", "velocity")
+PLACES = (Place(GOAL.quantity, (10.0,)), Place(VELOCITY.quantity, (3.0,)))
 
 
 @pytest.fixture
@@ -71,20 +75,20 @@ def test_a_contract_of_another_version_is_refused(saved):
 def test_a_loaded_tracker_acts_as_the_saved_one(tracker, tmp_path):
     config = {
         "robot": "cheetah", "observations": 23, "actions": 6, "hidden": [8], "projections": 0,
-        "reach": {"distance": 5.0, "speed": [-1.0, 3.0], "pitch": None},
+        "families": asdict(tracker.families),
     }  # fmt: skip
     save_artifact(tmp_path / "t", kind="tracker", config=config, weights=tracker, card="# Tiny\n", log="")
     loaded = load_tracker(str(tmp_path / "t"))
     observation = jax.random.normal(jax.random.key(0), (4, 23))
     np.testing.assert_array_equal(loaded.tracker.actor(observation), tracker.actor(observation))
-    assert (loaded.robot, loaded.tracker.reach) == ("cheetah", Reach(speed=(-1.0, 3.0), distance=5.0))
+    assert (loaded.robot, loaded.tracker.families) == ("cheetah", tracker.families)
     with pytest.raises(RebodyError):
         load_inference(str(tmp_path / "t"))
 
 
 @pytest.mark.parametrize(
     ("said", "view"),
-    [({}, FlatView(reach=10.0)), ({"places": [["x", 10.0], ["vx", 3.0]]}, FlatView((("x", 10.0), ("vx", 3.0)), 10.0))],
+    [({}, FlatView(reach=10.0)), ({"places": [asdict(place) for place in PLACES]}, FlatView(PLACES, 10.0))],
 )
 def test_a_loaded_flat_policy_acts_as_the_saved_one(flat_policy, tmp_path, said, view):
     config = said | {
@@ -103,13 +107,13 @@ def test_a_loaded_flat_policy_acts_as_the_saved_one(flat_policy, tmp_path, said,
 def test_a_loaded_step_predictor_says_what_the_saved_one_does(step_predictor, tracker, tmp_path):
     config = {
         "robot": "cheetah", "tracker_hash": "abc", "observations": 23, "hidden": [8], "projections": 0,
-        "reach": {"distance": 5.0, "speed": [-3.0, 3.0], "pitch": None},
+        "families": asdict(tracker.families),
     }  # fmt: skip
     save_artifact(tmp_path / "s", kind="step-predictor", config=config, weights=step_predictor, card="", log="")
     loaded = load_step_predictor(str(tmp_path / "s"))
     assert tree_hash(loaded.predictor) == tree_hash(step_predictor)
-    assert (loaded.name, loaded.robot, loaded.tracker_hash, loaded.predictor.reach) == (
-        "s", "cheetah", "abc", tracker.reach,
+    assert (loaded.name, loaded.robot, loaded.tracker_hash, loaded.predictor.families) == (
+        "s", "cheetah", "abc", tracker.families,
     )  # fmt: skip
     with pytest.raises(RebodyError, match="'tracker' is needed"):
         load_tracker(str(tmp_path / "s"))

@@ -20,7 +20,8 @@ from rebody.bodies import RobotBatch
 from rebody.bodies.robot import Fall, RobotSpec
 from rebody.errors import RebodyError
 from rebody.store import tree_hash
-from rebody.tasks import GOAL, reward
+from rebody.tasks import FamilySet
+from rebody.tasks.line import GOAL
 from rebody.types import Belief, Task, Transition, global_state
 
 WINDOW = 6
@@ -29,8 +30,18 @@ TARGETS = (3.0, -2.0, 8.0)
 
 
 def lasting(*targets, decisions=WINDOW):
-    target = np.tile(np.array(targets, np.float32), (decisions, 1))
-    return Task(np.full(target.shape, GOAL, np.int32), target)
+    target = np.tile(np.array(targets, np.float32), (decisions, 1))[..., None]
+    return Task(np.zeros(target.shape[:2], np.int32), target)
+
+
+@pytest.fixture(scope="module")
+def families(inference):
+    return inference.contract.families
+
+
+@pytest.fixture(scope="module")
+def controller(tracker, families):
+    return TrackerController(tracker, families)
 
 
 @pytest.fixture(scope="module")
@@ -39,11 +50,11 @@ def agent(inference):
 
 
 @pytest.fixture(scope="module")
-def run(agent, tracker, cheetah):
+def run(agent, controller, families, cheetah):
     """A function (targets, seeds, on_frame) -> episodes on the cheetah."""
 
     def run(targets=TARGETS, seeds=SEEDS, on_frame=None, spec=cheetah):
-        return rollout_on_robot(agent, TrackerController(tracker), spec, lasting(*targets), "plain", seeds, on_frame)
+        return rollout_on_robot(agent, controller, spec, lasting(*targets), families, seeds, on_frame)
 
     return run
 
@@ -58,8 +69,9 @@ def assert_same(tree, other, **tolerance):
 
 
 def test_shapes_and_length(episodes):
-    for leaf in jax.tree.leaves((episodes.state, episodes.reward, episodes.subgoal)):
+    for leaf in jax.tree.leaves((episodes.state, episodes.reward, episodes.subgoal.slot)):
         assert leaf.shape == (WINDOW, 3)
+    assert episodes.subgoal.value.shape == (WINDOW, 3, 1)
     assert episodes.belief.mean.shape == episodes.belief.variance.shape == (WINDOW, 3, 2)
     assert episodes.fell.shape == (3,)
     assert np.ptp(episodes.state.x, axis=0).min() > 1e-3  # it moves
@@ -80,14 +92,14 @@ def test_the_belief_of_a_decision_includes_its_transition(agent, episodes):
     np.testing.assert_allclose(episodes.belief.mean.swapaxes(0, 1), along.mean, atol=1e-5)
 
 
-def test_the_subgoal_of_a_decision_is_the_one_held_during_it(agent, cheetah, tracker):
+def test_the_subgoal_of_a_decision_is_the_one_held_during_it(agent, cheetah, controller, families):
     heard = []
-    tasks, controller = lasting(1.0), TrackerController(tracker)
+    tasks = lasting(1.0)
     episodes = rollout_on_robot(
-        agent, controller, cheetah, tasks, "plain", SEEDS[:1], lambda _, subgoal: heard.append(subgoal.value)
+        agent, controller, cheetah, tasks, families, SEEDS[:1], lambda _, subgoal: heard.append(subgoal.value)
     )
     assert len(heard) == WINDOW * cheetah.steps_per_decision
-    np.testing.assert_array_equal(np.array(heard)[:, 0], np.repeat(episodes.subgoal.value[:, 0], 2))
+    np.testing.assert_array_equal(np.array(heard)[:, 0, 0], np.repeat(episodes.subgoal.value[:, 0, 0], 2))
     assert len(np.unique(heard)) == WINDOW
 
 
@@ -95,9 +107,9 @@ def test_a_goal_is_made_relative_anew_at_every_control_step(run, monkeypatch):
     """Trap 2: a constant relative goal would be chased for ever."""
     x_before, told = [0.0], []
 
-    def spy(controller, joints, x, pitch, subgoal, belief):
-        told.append((float(x[0]), float(subgoal.value[0])))
-        return joint_action(controller, joints, x, pitch, subgoal, belief)
+    def spy(controller, joints, pose, subgoal, belief):
+        told.append((float(pose[0, 0]), float(subgoal.value[0, 0])))
+        return joint_action(controller, joints, pose, subgoal, belief)
 
     monkeypatch.setattr(rollout, "joint_action", spy)
     run(on_frame=lambda batch, subgoal: x_before.append(batch.qpos[0, 0]))
@@ -122,7 +134,7 @@ def test_same_seeds_same_result(run, episodes):
 @pytest.mark.parametrize("i", range(3))
 def test_an_episode_does_not_depend_on_those_beside_it(run, episodes, i):
     alone = run(TARGETS[i : i + 1], SEEDS[i : i + 1])
-    of_batch = jax.tree.map(lambda leaf: leaf[..., i : i + 1], (episodes.state, episodes.reward, episodes.subgoal))
+    of_batch = jax.tree.map(lambda leaf: leaf[:, i : i + 1], (episodes.state, episodes.reward, episodes.subgoal))
     assert_same((alone.state, alone.reward, alone.subgoal), of_batch, atol=1e-4)
     np.testing.assert_allclose(alone.belief.mean, episodes.belief.mean[:, i : i + 1], atol=1e-5)
 
@@ -143,15 +155,15 @@ def test_a_robot_that_gets_up_again_fell(run, cheetah, monkeypatch):
 
 
 def test_toy_episodes_are_those_stepped_by_hand(agent, inference):
-    tasks = lasting(*TARGETS)
-    episodes = rollout_on_toy(agent, inference.toy, tasks, "relative")
+    tasks, families = lasting(*TARGETS), FamilySet((GOAL,))  # whose reward is relative
+    episodes = rollout_on_toy(agent, inference.toy, tasks, families)
     step = eqx.filter_jit(lambda toy, body, action: toy.step(body, action, jax.random.key(0)))
     body = inference.toy.initial(jnp.zeros(3), jnp.zeros(3))
     carry, command = begin(agent, inference.toy.observe(body))
     for i in range(WINDOW):
         body = step(inference.toy, body, command.action)
         state = inference.toy.observe(body)
-        earned = reward(jax.tree.map(lambda leaf, i=i: leaf[i], tasks), state, "relative")
+        earned = families.reward(jax.tree.map(lambda leaf, i=i: leaf[i], tasks), state)
         held = command.subgoal
         carry, command = decide(agent, carry, Observation(state, earned))
         now = jax.tree.map(
@@ -178,48 +190,48 @@ class Listener(eqx.Module):
 
 
 @pytest.mark.parametrize("tick_steps", [1, 2, 3, 4, 5])
-def test_in_thesis_mode_the_module_hears_of_the_world_once_per_stride(tracker, cheetah, tick_steps):
+def test_in_thesis_mode_the_module_hears_of_the_world_once_per_stride(controller, families, cheetah, tick_steps):
     """What is returned stays 0.1 s apart, and velocities are those of the last 0.1 s, also between decisions."""
     task, qpos = lasting(1.0), []
     task.target[WINDOW // 2 :] = -1.0
-    listener = IdleAgent(inferrer=Listener(), reader=lambda belief: None, stride=1, actions=1)
+    listener = IdleAgent(inferrer=Listener(), reader=lambda belief: None, families=families, stride=1, actions=1)
     episodes = rollout_on_robot(
-        listener, TrackerController(tracker), cheetah, task, "plain", SEEDS[:1],
+        listener, controller, cheetah, task, families, SEEDS[:1],
         lambda batch, _: qpos.append(batch.qpos[0].copy()), EvenClock(tick_steps),
     )  # fmt: skip
     x = np.concatenate([[0.0], np.array(qpos)[:, 0]])  # after each control step
     assert len(qpos) == 2 * WINDOW
     np.testing.assert_allclose(episodes.state.x[:, 0], x[2::2], atol=1e-6)
     np.testing.assert_allclose(episodes.state.vx[:, 0], (x[2::2] - x[:-2:2]) / 0.1, atol=1e-5)
-    np.testing.assert_allclose(episodes.reward, -np.abs(episodes.state.x - task.target), atol=1e-6)
+    np.testing.assert_allclose(episodes.reward, -np.abs(episodes.state.x - task.target[..., 0]), atol=1e-6)
     for i in range(WINDOW):
         ticks = (2 * i + 2) // tick_steps
         step = ticks * tick_steps  # of the last tick by then
         before = max(step - 2, 0)  # it stood still before it began
         heard = [ticks, 0, 0, 0, 0]
         if ticks:
-            target = task.target[(step - 1) // 2, 0]
+            target = task.target[(step - 1) // 2, 0, 0]
             heard = [ticks, (x[step] - x[before]) / 0.1, -abs(x[step] - target), x[step - tick_steps], x[step]]
         np.testing.assert_allclose(episodes.belief.mean[i, 0], heard, atol=1e-5)
 
 
-def test_a_tick_per_decision_is_the_default_bit_for_bit(agent, tracker, cheetah, episodes):
-    controller, tasks = TrackerController(tracker), lasting(*TARGETS)
+def test_a_tick_per_decision_is_the_default_bit_for_bit(agent, controller, families, cheetah, episodes):
+    tasks = lasting(*TARGETS)
     every_decision = EvenClock(cheetah.steps_per_decision)
-    ticked = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS, None, every_decision)
+    ticked = rollout_on_robot(agent, controller, cheetah, tasks, families, SEEDS, None, every_decision)
     assert_same(ticked, episodes, rtol=0, atol=0)
-    seldom = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS, None, EvenClock(5))
+    seldom = rollout_on_robot(agent, controller, cheetah, tasks, families, SEEDS, None, EvenClock(5))
     assert np.abs(seldom.belief.mean - episodes.belief.mean).max() > 1e-3
 
 
-def test_a_flat_policy_moves_by_the_belief_alone(inference, flat_policy, cheetah):
+def test_a_flat_policy_moves_by_the_belief_alone(inference, families, flat_policy, cheetah):
     agent, tasks = build_agent("flat", inference), lasting(*TARGETS)
     controller = FlatController(flat_policy, inference.parts.module.decoder)
-    episodes = rollout_on_robot(agent, controller, cheetah, tasks, "plain", SEEDS)
+    episodes = rollout_on_robot(agent, controller, cheetah, tasks, families, SEEDS)
     assert np.isnan(episodes.subgoal.value).all()
     assert np.isfinite(episodes.state.x).all()
-    deaf = IdleAgent(inferrer=Deaf(), reader=lambda belief: None, stride=1, actions=1)
-    deaf = rollout_on_robot(deaf, controller, cheetah, tasks, "plain", SEEDS)
+    deaf = IdleAgent(inferrer=Deaf(), reader=lambda belief: None, families=families, stride=1, actions=1)
+    deaf = rollout_on_robot(deaf, controller, cheetah, tasks, families, SEEDS)
     np.testing.assert_allclose(deaf.state.x[0], episodes.state.x[0], atol=1e-5)  # both begin with the prior
     assert np.abs(deaf.state.x[-1] - episodes.state.x[-1]).min() > 1e-4
 
@@ -238,9 +250,11 @@ class Deaf(eqx.Module):
 
 
 def test_bayes_finds_goals_on_the_toy(inference):
-    episodes = rollout_on_toy(build_agent("bayes", inference), inference.toy, lasting(*TARGETS), "plain")
-    np.testing.assert_allclose(episodes.subgoal.value[-1], TARGETS, atol=0.011)
-    np.testing.assert_array_equal(episodes.subgoal.slot, np.full((WINDOW, 3), GOAL))
+    episodes = rollout_on_toy(
+        build_agent("bayes", inference), inference.toy, lasting(*TARGETS), inference.contract.families
+    )
+    np.testing.assert_allclose(episodes.subgoal.value[-1, :, 0], TARGETS, atol=0.011)
+    np.testing.assert_array_equal(episodes.subgoal.slot, np.zeros((WINDOW, 3)))
 
 
 @pytest.fixture(scope="module")
@@ -258,7 +272,7 @@ def test_an_agent_driven_from_outside_does_the_same(live, cheetah, episodes):
             heard = -abs(batch.x[0] - TARGETS[0]) if step == 0 else 99.0
             batch.step(live.step(np.concatenate([batch.qpos[0], batch.qvel[0]]), float(heard))[None])
         assert batch.x[0] == pytest.approx(episodes.state.x[i, 0], abs=1e-4)
-        assert float(live.subgoal.value) == pytest.approx(float(episodes.subgoal.value[i, 0]), abs=1e-4)
+        assert live.subgoal.value == pytest.approx(episodes.subgoal.value[i, 0], abs=1e-4)
     np.testing.assert_allclose(live.belief.mean, episodes.belief.mean[-2, 0], atol=1e-5)
 
 

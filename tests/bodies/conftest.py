@@ -31,7 +31,7 @@ body = "trunk"
 max_pitch = 1.5
 
 [reach]
-speed = [-1, 2.5]
+velocity = [-1, 2.5]
 """
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from rebody.bodies import RobotBatch, load_robot, shipped_robots
-from rebody.bodies.robot import Fall, Reach
+from rebody.bodies.robot import Fall
 from rebody.errors import RebodyError
 from rebody.names import ROBOTS
+from rebody.ranges import Box, interval
 
 ANT = Path(__file__).parents[2] / "examples" / "ant" / "ant.toml"
 
@@ -22,7 +23,8 @@ def test_a_described_robot_can_be_used(name):
     spec = load_robot(name)
     assert spec.name == Path(name).stem
     assert spec.steps_per_decision * spec.control_dt == pytest.approx(0.1)
-    assert spec.reach.speed[0] < 0 < spec.reach.speed[1]
+    speed = dict(spec.reach)["velocity"]
+    assert speed.low[0] < 0 < speed.high[0]
     batch = RobotBatch(spec, 2, threads=1)
     batch.reset(np.random.default_rng(0))
     batch.step(np.zeros((2, spec.model.nu)))
@@ -62,14 +64,14 @@ def test_those_that_balance_fall_when_low_or_aslant(name, lowest, steepest):
 
 def test_the_cheetah_falls_on_its_back_only_and_after_a_second(cheetah):
     assert cheetah.fall == Fall(max_pitch=2.0, lasts_s=1.0)
-    assert cheetah.reach.pitch == (-1.0472, 1.0472)
+    assert dict(cheetah.reach)["stand"] == interval(-1.0472, 1.0472)
 
 
 def test_an_own_robot_is_read_beside_its_model(write_own):
     spec = load_robot(write_own())
     assert (spec.name, spec.root, spec.frame_skip, spec.control_dt) == ("own", "trunk", 5, 0.05)
     assert spec.fall == Fall(max_pitch=1.5)
-    assert spec.reach == Reach(speed=(-1.0, 2.5), distance=5.0, pitch=None)
+    assert spec.reach == (("velocity", interval(-1.0, 2.5)),)
     assert spec.reset_noise == 0.01
     assert spec.model.nu == 1
     assert spec.torso_height == 0.5
@@ -80,24 +82,25 @@ def test_every_setting_of_a_file_counts(write_own):
         [
             ("frame_skip = 5", "frame_skip = 10\nreset_noise = 0.2"),
             ("max_pitch = 1.5", "min_height = 0.2\nmax_pitch = 1.1\nlasts_s = 0.3"),
-            ("speed = [-1, 2.5]", "speed = [-2, 2]\ndistance = 7\npitch = [-0.5, 0.4]"),
+            ("velocity = [-1, 2.5]", "velocity = [-2, 2]\nlean = [[-7, 7], [-0.5, 0.4]]"),
         ]
     )
     spec = load_robot(path)
     assert (spec.frame_skip, spec.reset_noise) == (10, 0.2)
     assert spec.fall == Fall(min_height=0.2, max_pitch=1.1, lasts_s=0.3)
-    assert spec.reach == Reach(speed=(-2.0, 2.0), distance=7.0, pitch=(-0.5, 0.4))
+    assert spec.reach == (("velocity", interval(-2.0, 2.0)), ("lean", Box((-7.0, -0.5), (7.0, 0.4))))
 
 
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
         ("frame_skip = 5\n", "", "missing required field `frame_skip`"),
-        ("speed = [-1, 2.5]", "distance = 3", r"missing required field `speed` - at `\$\.reach`"),
+        ("velocity = [-1, 2.5]", "velocity = 3", r"Expected `array`, got `int` - at `\$\.reach"),
+        ("velocity = [-1, 2.5]", "", r"\[reach\] names no family"),
         ("frame_skip = 5", "frame_skip = 5\ncolour = 'red'", "unknown field `colour`"),
         ("max_pitch", "max_roll", r"unknown field `max_roll` - at `\$\.fall`"),
         ("frame_skip = 5", "frame_skip = '5'", "Expected `int`, got `str`"),
-        ("[-1, 2.5]", "[-1, 0, 2.5]", "length 2"),
+        ("[-1, 2.5]", "[-1, 0, 2.5]", r"\[reach\] velocity: pairs of ends has shape \(1, 3\)"),
         ("frame_skip = 5", "frame_skip =", "is not a TOML file"),
         ('body = "trunk"', 'body = "trunk"\nx = "hip"', "either the joints that carry x, z and pitch, or the body"),
         ('body = "trunk"', 'x = "hip"\nz = "hip"', "either the joints that carry x, z and pitch, or the body"),
@@ -110,10 +113,9 @@ def test_every_setting_of_a_file_counts(write_own):
         ("[fall]", "[rest]\nhip = 'low'\n[fall]", "Expected `float`, got `str`"),
         ("max_pitch = 1.5", "max_pitch = 0", "max_pitch must be positive"),
         ("max_pitch = 1.5", "lasts_s = -1", "lasts_s not negative"),
-        ("[-1, 2.5]", "[2.5, -1]", "ascending"),
-        ("[-1, 2.5]", "[nan, 1]", "ascending"),
-        ("[reach]", "[reach]\ndistance = 0", "distance must be positive"),
-        ("[reach]", "[reach]\npitch = [1, -1]", r"pitch = \[lowest, highest\] must be ascending"),
+        ("[-1, 2.5]", "[2.5, -1]", r"\[reach\] velocity: from \[2\.5\] to \[-1\.0\] there is nothing"),
+        ("[-1, 2.5]", "[nan, 1]", "is nan; give a finite number"),
+        ("[reach]", "[reach]\nlean = [[-7, 7], [1, 0]]", r"\[reach\] lean: from \[-7\.0, 1\.0\] to \[7\.0, 0\.0\]"),
     ],
 )
 def test_a_bad_file_is_named_with_what_is_wrong(write_own, old, new, says):
@@ -124,8 +126,8 @@ def test_a_bad_file_is_named_with_what_is_wrong(write_own, old, new, says):
 
 
 def test_all_that_is_out_of_range_is_said_at_once(write_own):
-    path = write_own([("frame_skip = 5", "frame_skip = 0"), ("[-1, 2.5]", "[1, 1]")])
-    with pytest.raises(RebodyError, match=r"frame_skip must.*; .*speed"):
+    path = write_own([("frame_skip = 5", "frame_skip = 0\ntimestep = 0")])
+    with pytest.raises(RebodyError, match=r"frame_skip must.*; .*timestep"):
         load_robot(path)
 
 

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from rebody.bodies import RobotBatch, load_robot
-from rebody.bodies.robot import Reach, wrap_angle
+from rebody.bodies.robot import wrap_angle
+from rebody.control.places import reachable
 from rebody.errors import RebodyError
+from rebody.ranges import interval
+from rebody.tasks import SHIPPED
 
 STEPS = 60
 ANT = str(Path(__file__).parents[2] / "examples" / "ant" / "ant.toml")
@@ -73,7 +76,9 @@ def test_moves_bit_for_bit_as_gymnasiums(name, theirs, tmp_path, monkeypatch):
     ],
 )
 def test_targets_are_cut_to_what_a_robot_reaches(family, asked, reached):
-    assert Reach(speed=(-1.0, 2.0), jump=(1.0, 2.0)).within(family, *asked) == reached
+    reach = {"goal": interval(-5.0, 5.0), "velocity": interval(-1.0, 2.0), "jump": interval(1.0, 2.0)}
+    asks = SHIPPED.named(family).within(interval(*asked))
+    assert reachable(asks, reach.get(family)) == interval(*reached)
 
 
 def test_threads_do_not_change_a_bit(cheetah):

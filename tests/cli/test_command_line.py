@@ -165,7 +165,7 @@ def _rewrite(change: Callable[[dict], None]) -> Callable[[Path], None]:
         (_rewrite(lambda config: config["contract"].update(version=99)), "version 99"),
         (_rewrite(lambda config: config["contract"].update(decision_dt=0.05)), "every 0.05 s"),
         (_rewrite(lambda config: config["contract"].update(fields=["x", "y"])), "contract.fields: x, y"),
-        (_rewrite(lambda config: config["contract"].update(target_ranges={"jump": [1.5, 3.0]})), "jump"),
+        (_rewrite(lambda config: config["contract"]["families"]["families"][0].update(name="jump")), "jump"),
         (_rewrite(lambda config: config["inference"].update(units=32)), "position"),
         (_rewrite(lambda config: config["inference"].update(colour="red")), "not understood"),
     ],

@@ -9,9 +9,8 @@ import pytest
 from rebody.agents.parts import load_inference
 from rebody.bodies.toys import FullToy, MassDamper, PositionToy
 from rebody.cli.main import run
-from rebody.inference.module import BASE_TASKS
+from rebody.ranges import interval
 from rebody.store import load_artifact, save_artifact
-from rebody.tasks import GOAL, STAND, VELOCITY
 
 SECONDS, DECISIONS = "3", 30
 TASKS = [
@@ -85,7 +84,7 @@ def test_the_json_is_as_documented(robot, trained, evaluate, capsys):
         assert (np.diff(np.ravel(episode["subgoal"]))[::2] == 0).all()  # held for two decisions
         assert isinstance(episode["oracle_return"], float)
     switched = results["episodes"][2]
-    assert switched["switch"] == TASKS[1]["switch"]
+    assert switched["switch"] == TASKS[1]["switch"] | {"target": [4.0]}
     assert switched["active_target"] == 15 * [[-1.0]] + 15 * [[4.0]]
     assert results["summary"]["families"]["goal"]["episodes"] == 4
 
@@ -225,7 +224,7 @@ def test_a_module_of_the_position_toy(tiny_training, tmp_path):
     assert run([*thesis, "--out", out]) == 0
     loaded = load_inference(out)
     assert loaded.toy == PositionToy()
-    assert loaded.contract.target_ranges == {"goal": (0.0, 10.0)}
+    assert loaded.contract.families.ranges == {"goal": interval(0.0, 10.0)}
     assert loaded.parts.module.encoder.latent == 1
     assert loaded.parts.high_level.view.fields == loaded.parts.told_policy.view.fields == ("x",)
     assert run([*thesis, "--toy", "mass-damper", "--out", str(tmp_path / "other")]) == 0
@@ -236,14 +235,14 @@ def test_a_module_of_the_full_toy_is_what_was_asked_for(full_module):
     loaded = load_inference(str(full_module))
     module = loaded.parts.module
     assert loaded.toy == FullToy()
-    assert loaded.contract.target_ranges.keys() == {"goal", "velocity", "stand"}
+    assert loaded.contract.families.names == ("goal", "velocity", "stand")
     assert loaded.contract.window is module.encoder.window is None
     assert (module.encoder.latent, module.encoder.kinds, module.decoder.kinds) == (5, 2, 2)
-    assert module.labeller.weights[-1].shape == (5, BASE_TASKS)
+    assert module.labeller.weights[-1].shape == (5, 6)
     assert loaded.parts.mixture.mean.shape == (6, 2)
     assert loaded.parts.mixture.active.any()
     assert np.abs(loaded.parts.probe.target_weights).max(axis=0).min() > 0
-    assert sorted(loaded.parts.probe.families) == [GOAL, VELOCITY, STAND]
+    assert loaded.parts.probe.families == loaded.contract.families
     log = (full_module / "log.csv").read_text().splitlines()
     assert len(log) == 5
     assert {"kl", "mixture/components", "told/critic_loss"} <= set(log[0].split(","))

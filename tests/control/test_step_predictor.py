@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
-from rebody.control.step_predictor import step_reward, steps_of
-from rebody.control.tracker import Command
-from rebody.tasks import GOAL, VELOCITY
+from rebody.control.command import Command
+from rebody.control.step_predictor import is_predictable, step_reward, steps_of
+from rebody.tasks.line import LINE
 
+GOAL, VELOCITY = 0, 1
+"""Slots of the tiny tracker."""
 JOINTS = np.linspace(-1, 1, 3 * 17, dtype=np.float32).reshape(3, 17)
 
 
 def command(*values, slot=GOAL):
-    return Command(np.full(len(values), slot), np.array(values, np.float32))
+    return Command(np.full(len(values), slot), np.array(values, np.float32)[:, None])
 
 
 def test_every_number_of_steps_has_an_equal_share_of_the_actions():
@@ -38,8 +40,18 @@ def test_every_number_of_steps_has_an_equal_share_of_the_actions():
 )
 @pytest.mark.parametrize("slot", [GOAL, VELOCITY])
 def test_the_reward_is_that_of_the_thesis(asked, error, steps, paid, slot):
-    reward = step_reward(command(asked, slot=slot), np.array([error], np.float32), np.array([steps]))
+    reward = step_reward(command(asked, slot=slot), np.array([[error]], np.float32), np.array([steps]))
     np.testing.assert_allclose(reward, [paid], atol=1e-6)
+
+
+def test_errors_of_vectors_are_relative_lengths():
+    told = Command(np.zeros(1, int), np.array([[0.6, -0.8]], np.float32))
+    reward = step_reward(told, np.array([[0.3, 0.4]], np.float32), np.array([2]))
+    np.testing.assert_allclose(reward, [-0.5 - 0.2], atol=1e-5)
+
+
+def test_it_knows_positions_and_speeds_along_x():
+    assert [family.name for family in LINE if is_predictable(family)] == ["goal", "velocity"]
 
 
 def test_it_sees_the_joints_and_the_command(step_predictor):

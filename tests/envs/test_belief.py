@@ -14,7 +14,8 @@ NO_BOUNDS = "ignore:.*A Box observation space m(in|ax)imum value is:UserWarning"
 
 
 def believing(name, control_dt, inference="goal-velocity", **functions):
-    settings = {"reward": "relative"} if name.startswith("rebody/") else {}
+    families = load_inference(inference).contract.families
+    settings = {"families": families} if name.startswith("rebody/") else {}
     return BeliefObservation(gymnasium.make(name, **settings), inference, control_dt=control_dt, **functions)
 
 

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env, data_equivalence
 
+from rebody.envs.world import DEFAULT_FAMILIES
 from rebody.errors import RebodyError
-from rebody.tasks import BaseTask
+from rebody.ranges import Box, interval
+from rebody.tasks import Family, FamilySet, Quantity
+from rebody.tasks.line import GOAL, VELOCITY
 
 IDS = ["rebody/PointMass-v0", "rebody/HalfCheetah-v0"]
 
@@ -61,14 +64,14 @@ def test_the_task_is_in_the_info_only(env):
     first, info = env.reset(seed=0, options={"family": "goal", "target": -3.3})
     second, other = env.reset(seed=0, options={"family": "velocity", "target": 2.0})
     np.testing.assert_array_equal(first, second)
-    assert (info["family"], info["target"]) == ("goal", -3.3)
-    assert (other["family"], other["target"]) == ("velocity", 2.0)
+    assert (info["family"], *info["target"]) == ("goal", -3.3)
+    assert (other["family"], *other["target"]) == ("velocity", 2.0)
 
 
 @pytest.mark.parametrize(("form", "scale"), [("plain", 1.0), ("relative", 4.0)])
 @pytest.mark.parametrize("name", IDS)
 def test_reward_is_the_error_at_the_global_state(name, form, scale):
-    env = gymnasium.make(name, reward=form)
+    env = gymnasium.make(name, families=DEFAULT_FAMILIES.paid_by(form))
     for family, field in (("goal", "x"), ("velocity", "vx")):
         env.reset(seed=0, options={"family": family, "target": -4.0})
         for _ in range(3):
@@ -88,11 +91,12 @@ def test_velocity_is_the_mean_over_the_last_tenth_of_a_second(env):
         assert info["vx"] == pytest.approx((x[-1] - x[-1 - steps]) / 0.1, abs=1e-5)
 
 
-def test_tasks_are_drawn_from_the_base_tasks():
-    env = gymnasium.make(IDS[0], base_tasks=[BaseTask("goal", 5.0, 6.0), BaseTask("velocity", -2.0, -1.0)])
+def test_tasks_are_drawn_from_the_targets_of_families():
+    families = FamilySet((GOAL.within(interval(5.0, 6.0)), VELOCITY.within(interval(-2.0, -1.0))))
+    env = gymnasium.make(IDS[0], families=families)
     infos = [env.reset(seed=seed)[1] for seed in range(40)]
-    goals = [info["target"] for info in infos if info["family"] == "goal"]
-    velocities = [info["target"] for info in infos if info["family"] == "velocity"]
+    goals = [info["target"][0] for info in infos if info["family"] == "goal"]
+    velocities = [info["target"][0] for info in infos if info["family"] == "velocity"]
     assert min(len(goals), len(velocities)) > 8
     assert 5.0 <= min(goals) < max(goals) <= 6.0
     assert -2.0 <= min(velocities) < max(velocities) <= -1.0
@@ -105,10 +109,11 @@ def test_tasks_are_drawn_from_the_base_tasks():
         ({"target": 1.0}, "'family' and 'target' together"),
         ({"family": "goal", "target": 1.0, "speed": 1}, "'speed'; give 'family' and 'target'"),
         ({"family": "gaol", "target": 1.0}, r"Did you mean 'goal'\?"),
-        ({"family": 3, "target": 1.0}, "unknown task family '3'"),
+        ({"family": 3, "target": 1.0}, "unknown family '3'"),
         ({"family": "goal", "target": "far"}, "the target is 'far'; give a number"),
         ({"family": "goal", "target": float("nan")}, "the target is nan; give a finite number"),
         ({"family": "goal", "target": None}, "the target is None; give a number"),
+        ({"family": "goal", "target": [1.0, 2.0]}, r"a target of 'goal' has 1 numbers \(x\), not 2"),
     ],
 )
 def test_malformed_options(options, message):
@@ -116,17 +121,23 @@ def test_malformed_options(options, message):
         gymnasium.make(IDS[0]).reset(options=options)
 
 
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"reward": "sparse"}, "Rewards are: plain, relative"),
-        ({"base_tasks": []}, "base_tasks is empty"),
-        ({"base_tasks": [BaseTask("fly", 0.0, 1.0)]}, "unknown task family 'fly'"),
-    ],
-)
-def test_malformed_settings(settings, message):
-    with pytest.raises(RebodyError, match=message):
-        gymnasium.make(IDS[0], **settings)
+@pytest.mark.parametrize("families", [[], GOAL, "goal"])
+def test_what_is_no_set_of_families_is_refused(families):
+    with pytest.raises(RebodyError, match=r"give a rebody\.tasks\.FamilySet"):
+        gymnasium.make(IDS[0], families=families)
+
+
+def test_a_target_of_several_numbers():
+    """Beside a family of one number, whose targets have a zero behind."""
+    place = Family("place", Quantity("p", ("x", "z"), "m", "place"), (Box((1.0, 0.0), (4.0, 0.5)),), 1.0, 0.25, "plain")
+    env = gymnasium.make(IDS[1], families=FamilySet((place, *DEFAULT_FAMILIES)))
+    _, info = env.reset(seed=0, options={"family": "goal", "target": -3.0})
+    np.testing.assert_array_equal(info["target"], [-3.0, 0.0])
+    env.reset(seed=0, options={"family": "place", "target": [2.0, 0.3]})
+    for _ in range(3):
+        _, reward, _, _, info = env.step(env.action_space.sample())
+        np.testing.assert_array_equal(info["target"], [2.0, 0.3])
+        assert reward == pytest.approx(-np.hypot(info["x"] - 2.0, info["z"] - 0.3), rel=1e-5)
 
 
 def vector(name, mode, **settings):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rebody.evaluation.changes import base_task_right, summarise_changes
+from rebody.evaluation.changes import summarise_changes
 
 AFTER = 20
 """Decisions after the change."""
@@ -33,7 +33,7 @@ def medians(*episodes):
 
 def test_a_change_is_noticed_when_family_and_sign_are_right(changed):
     episode = changed(("goal", 5.0), ("goal", -4.0), 3)
-    np.testing.assert_array_equal(base_task_right(episode), [True] * 10 + [False] * 2 + [True] * 18)
+    np.testing.assert_array_equal(episode.base_task_right(), [True] * 10 + [False] * 2 + [True] * 18)
     assert medians(episode)[:2] == (1, pytest.approx(0.3))
 
 

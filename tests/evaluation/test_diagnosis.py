@@ -10,7 +10,10 @@ from rich.console import Console
 from rebody.evaluation.diagnosis import LADDER, Diagnosis, diagnose, diagnoses_among, diagnosis_tables, shares_of
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.results import Results
+from rebody.ranges import Box
 from rebody.report.diagnosis import plot_diagnosis
+from rebody.tasks import SHIPPED, FamilySet, Quantity
+from rebody.tasks.line import GOAL
 from rebody.tasks.task_file import TaskSpec
 
 TIME = 40
@@ -23,17 +26,19 @@ def episode_of(family="goal", target=4.0, *, read=None, subgoal=None, reached=No
     reached = subgoal if reached is None else reached
     x, v = ([reached] * TIME, [0.0] * TIME) if family == "goal" else ([0.0] * TIME, [reached] * TIME)
     return EpisodeResult(
-        family=family, target=target, seed=0, switch=None, time_s=(0.1 * np.arange(1, TIME + 1)).tolist(),
+        families=SHIPPED, family=family, target=[target], seed=0, switch=None,
+        time_s=(0.1 * np.arange(1, TIME + 1)).tolist(),
         quantities={"x": x, "vx": v, "pitch": [0.0] * TIME, "vz": [0.0] * TIME}, reward=[paid / TIME] * TIME,
-        active_family=[family] * TIME, active_target=[target] * TIME, inferred_family=[guessed or family] * TIME,
-        inferred_target=[read] * TIME, cluster=[0] * TIME, latent=[[0.0, 0.0]] * TIME,
-        subgoal_family=[slot or family] * TIME, subgoal=[subgoal] * TIME, fell=False, return_=paid, oracle_return=-5.0,
-        idle_return=None,         final_error=abs(reached - target), final_squared_error=0.0, ripple_m_s=0.0,
+        active_family=[family] * TIME, active_target=[[target]] * TIME, inferred_family=[guessed or family] * TIME,
+        inferred_target=[[read]] * TIME, cluster=[0] * TIME, latent=[[0.0, 0.0]] * TIME,
+        subgoal_family=[slot or family] * TIME, subgoal=[[subgoal]] * TIME, fell=False, return_=paid,
+        oracle_return=-5.0, idle_return=None, final_error=abs(reached - target),
+        final_squared_error=0.0, ripple_m_s=0.0,
     )  # fmt: skip
 
 
 def results_of(*episodes, agent="reuse"):
-    return Results("cheetah", agent, "tiny", "tiny-tracker", 0.05, 1, 15, False, {}, list(episodes))
+    return Results("cheetah", agent, "tiny", "tiny-tracker", 0.05, 1, 15, False, {}, SHIPPED, list(episodes))
 
 
 def diagnosis_of(*episodes):
@@ -62,6 +67,29 @@ def test_shares_are_distances_along_the_chain():
     np.testing.assert_allclose([shares.read, shares.high_level, shares.tracker], [0.1, 0.3, 0.1], atol=1e-9)
 
 
+def test_shares_of_vectors_are_lengths_of_differences():
+    """A heading by the shorter way round; a read target of another family is cut, or filled up."""
+    dock = replace(
+        GOAL, name="dock", quantity=Quantity("x_yaw", ("x", "yaw"), "m, rad", "dock"),
+        targets=(Box((-5.0, -3.0), (5.0, 3.0)),), directions=(),
+    )  # fmt: skip
+    episode = replace(
+        episode_of(), families=FamilySet((dock, GOAL)), family="dock", target=[4.0, 3.1],
+        active_family=["dock"] * TIME, active_target=[[4.0, 3.1]] * TIME,
+        inferred_family=["dock"] * TIME, inferred_target=[[4.0, -3.1]] * TIME,
+        subgoal_family=["dock"] * TIME, subgoal=[[3.7, -2.7]] * TIME,
+        quantities={"x_yaw": [[3.7, -2.6]] * TIME, "x": [3.7] * TIME},
+    )  # fmt: skip
+    shares = shares_of(episode)
+    expected = [2 * np.pi - 6.2, 0.5, 0.1]
+    np.testing.assert_allclose([shares.read, shares.high_level, shares.tracker], expected, atol=1e-5)
+    assert shares.base_task_right
+    assert shares.slot_right
+    misread = replace(episode, inferred_family=["goal"] * TIME, inferred_target=[[4.0]] * TIME)
+    assert shares_of(misread).culprit == "wrong base task"
+    assert shares_of(misread).read == pytest.approx(3.1)
+
+
 def test_nobody_is_to_blame_within_tolerance():
     assert not diagnosis_of(episode_of(reached=4.2), episode_of("velocity", 2.0, reached=1.9)).culprits()
 
@@ -87,10 +115,10 @@ def test_a_base_task_must_be_known_after_twenty_decisions():
 
 def test_every_agent_does_the_same_tasks(trial, tmp_path):
     told = []
-    diagnosis = diagnose(trial, [TaskSpec("goal", 3.0), TaskSpec("goal", -2.0)], 1, told.append)
+    diagnosis = diagnose(trial, [TaskSpec("goal", (3.0,)), TaskSpec("goal", (-2.0,))], 1, told.append)
     assert told == list(LADDER)
     assert [results.agent for results in diagnosis.results.values()] == [*told, "idle"]
-    assert len({tuple(e.target for e in results.episodes) for results in diagnosis.results.values()}) == 1
+    assert len({tuple(tuple(e.target) for e in results.episodes) for results in diagnosis.results.values()}) == 1
     console = Console(width=200, record=True, file=io.StringIO())
     for table in diagnosis_tables(diagnosis):
         console.print(table)

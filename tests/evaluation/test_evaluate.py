@@ -16,14 +16,17 @@ from rebody.bodies import load_robot
 from rebody.bodies.toys import PositionToy
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate, save_results
-from rebody.evaluation.evaluate import POINT_MASS, run_trial, take_yardsticks, trial_agent
+from rebody.evaluation.evaluate import run_trial, take_yardsticks, trial_agent
+from rebody.evaluation.trial import POINT_MASS
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import no_mixture
 from rebody.store import tree_hash
 from rebody.store.typed import typed
+from rebody.tasks import FamilySet
+from rebody.tasks.line import GOAL, STAND, VELOCITY
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 
-SPECS = [TaskSpec("goal", 2.0), TaskSpec("goal", 1.0, Switch(1.2, "goal", -3.0))]
+SPECS = [TaskSpec("goal", (2.0,)), TaskSpec("goal", (1.0,), Switch(1.2, "goal", (-3.0,)))]
 SEEDS = 2
 
 
@@ -33,7 +36,7 @@ def results(trial):
 
 
 def test_every_task_once_per_seed(results):
-    ran = [(episode.target, episode.seed) for episode in results.episodes]
+    ran = [(*episode.target, episode.seed) for episode in results.episodes]
     assert ran == [(2.0, 0), (2.0, 1), (1.0, 0), (1.0, 1)]
     assert {len(episode.time_s) for episode in results.episodes} == {30}
     assert (results.robot, results.control_dt, results.tracker, results.horizon) == ("cheetah", 0.05, "tiny-tracker", 5)
@@ -41,12 +44,12 @@ def test_every_task_once_per_seed(results):
 
 def test_every_task_and_seed_has_a_start_of_its_own_whatever_else_is_evaluated(trial, results):
     def starts(results):
-        return {(episode.target, episode.seed): episode.quantities["pitch"][0] for episode in results.episodes}
+        return {(*episode.target, episode.seed): episode.quantities["vx"][0] for episode in results.episodes}
 
-    pitch = starts(results)
-    assert len({round(start, 3) for start in pitch.values()}) == len(pitch)
+    begins = starts(results)
+    assert len({round(start, 3) for start in begins.values()}) == len(begins)
     alone = starts(evaluate(trial, SPECS[1:], 1))
-    assert alone[1.0, 0] == pytest.approx(pitch[1.0, 0], abs=1e-4)
+    assert alone[1.0, 0] == pytest.approx(begins[1.0, 0], abs=1e-4)
 
 
 def test_yardsticks_taken_before_save_time_and_change_nothing(trial, results):
@@ -62,10 +65,9 @@ def test_the_task_changes_at_its_moment(results):
     """Rewards and what is said to be active agree."""
     for episode in results.episodes[SEEDS:]:
         late = np.array(episode.time_s) > 1.2 + 1e-9
-        np.testing.assert_array_equal(episode.active_target, np.where(late, -3.0, 1.0))
-        np.testing.assert_allclose(
-            episode.reward, -np.abs(np.array(episode.quantities["x"]) - episode.active_target), atol=1e-4
-        )
+        target = np.array(episode.active_target)[:, 0]
+        np.testing.assert_array_equal(target, np.where(late, -3.0, 1.0))
+        np.testing.assert_allclose(episode.reward, -np.abs(np.array(episode.quantities["x"]) - target), atol=1e-4)
         x = np.array(episode.quantities["x"])[-20:]
         assert episode.final_error == pytest.approx(np.abs(x + 3).mean(), abs=1e-4)
 
@@ -90,7 +92,7 @@ def test_returns_are_sums_of_rewards(results):
 
 
 def test_the_oracle_is_told_the_active_task_and_regrets_nothing(trial, results):
-    specs = [*SPECS, TaskSpec("velocity", -1.5, Switch(0.5, "goal", 4.0))]
+    specs = [*SPECS, TaskSpec("velocity", (-1.5,), Switch(0.5, "goal", (4.0,)))]
     oracle = evaluate(replace(trial, agent="oracle"), specs, 1)
     for episode in oracle.episodes:
         assert episode.subgoal == episode.active_target
@@ -103,7 +105,7 @@ def test_the_oracle_is_told_the_active_task_and_regrets_nothing(trial, results):
 
 def test_the_idle_agent_is_the_same_on_every_task(trial):
     idle = replace(trial, agent="idle")
-    tasks = active_tasks([TaskSpec("goal", 2.0), TaskSpec("goal", -7.0)], idle.decisions, 0.1)
+    tasks = active_tasks([TaskSpec("goal", (2.0,)), TaskSpec("goal", (-7.0,))], idle.in_play, idle.decisions, 0.1)
     episodes = run_trial(idle, trial_agent(idle, tasks), tasks, [5, 5])
     np.testing.assert_allclose(episodes.state.x[:, 0], episodes.state.x[:, 1], atol=1e-3)
     assert (episodes.reward[:, 0] != episodes.reward[:, 1]).any()
@@ -151,7 +153,7 @@ def test_a_point_mass_may_be_another_one_than_the_module_learned_on(trial):
     assert np.abs(np.diff(fast.quantities["x"])).max() > 0.02 + 1e-3
 
 
-FAR_AND_NEAR = [TaskSpec("goal", target) for target in (-9.0, -3.0, 3.0, 9.0)]
+FAR_AND_NEAR = [TaskSpec("goal", (target,)) for target in (-9.0, -3.0, 3.0, 9.0)]
 
 
 @pytest.fixture(scope="module")
@@ -191,9 +193,9 @@ def test_who_has_no_latent_that_a_mixture_knows_has_one_cluster(trial, with_mixt
 
 
 def test_a_module_of_several_families_is_for_the_point_mass_and_for_readout(trial):
-    ranges = {"goal": (-10.0, 10.0), "velocity": (-3.0, 3.0)}
+    families = FamilySet((GOAL, VELOCITY))
     config = {
-        "contract": asdict(replace(trial.inference.contract, target_ranges=ranges)),
+        "contract": asdict(replace(trial.inference.contract, families=families)),
         "inference": {"units": 8, "window": 6, "latent": 2},
         "high_level": {"fields": ["x", "vx"], "scales": [10.0, 3.5], "hidden": [8], "projections": 0},
         "toy": {"kind": "mass-damper"},
@@ -201,7 +203,7 @@ def test_a_module_of_several_families_is_for_the_point_mass_and_for_readout(tria
     settings = typed(config, InferenceSettings)
     parts = eqx.filter_jit(lambda: inference_template(settings))()
     several = replace(trial.inference, contract=settings.contract, parts=parts)
-    specs = [TaskSpec("goal", 2.0), TaskSpec("velocity", -1.0)]
+    specs = [TaskSpec("goal", (2.0,)), TaskSpec("velocity", (-1.0,))]
     toy = evaluate(on_the_toy(trial, inference=several), specs, 1)
     assert set(toy.summary["families"]) == {"goal", "velocity"}
     assert evaluate(replace(trial, inference=several, agent="readout"), specs, 1).episodes
@@ -273,7 +275,7 @@ def test_a_step_predictor_that_does_not_fit_is_refused(trial, predicting):
     ):
         with pytest.raises(RebodyError, match=said):
             evaluate(replace(told, step_predictor=replace(told.step_predictor, **change)), SPECS, 1)
-    stands = replace(trial.inference, contract=replace(trial.inference.contract, target_ranges={"stand": (-1.0, 1.0)}))
+    stands = replace(trial.inference, contract=replace(trial.inference.contract, families=FamilySet((STAND,))))
     with pytest.raises(RebodyError, match="knows goals and speeds, and 'tiny' may ask for stand"):
         check_step_predictor(told.step_predictor, told.tracker, stands)
 
@@ -282,18 +284,18 @@ def of_another_module(trial):
     return replace(trial.flat, inference_hash="0" * 64)
 
 
-SEES_YAW = Contract(("yaw",), 6, {"goal": (-9.0, 9.0)}, "plain")
+SEES_YAW = Contract(("yaw",), 6, FamilySet((GOAL,)))
 REFUSED = {
     "was trained on 'cheetah', not on 'hopper'": lambda trial: (
         replace(trial, robot=replace(load_robot("cheetah"), name="hopper")), SPECS,
     ),
-    "'tiny' was trained on goal and cannot infer 'velocity'": lambda trial: (trial, [TaskSpec("velocity", 1.0)]),
+    "'tiny' was trained on goal and cannot infer 'velocity'": lambda trial: (trial, [TaskSpec("velocity", (1.0,))]),
     "cannot infer 'velocity'.*rebody list": lambda trial: (
-        trial, [TaskSpec("goal", 1.0, Switch(1.0, "velocity", 1.0))],
+        trial, [TaskSpec("goal", (1.0,), Switch(1.0, "velocity", (1.0,)))],
     ),
     "--seconds 2.9 is too short": lambda trial: (replace(trial, seconds=2.9), SPECS),
     "a switch at 3 s is not within an episode of 3 s": lambda trial: (
-        trial, [TaskSpec("goal", 1.0, Switch(3.0, "goal", 2.0))],
+        trial, [TaskSpec("goal", (1.0,), Switch(3.0, "goal", (2.0,)))],
     ),
     "flat policy 'tiny-flat' was trained on the beliefs of another module than 'tiny'": lambda trial: (
         replace(trial, agent="flat", flat=of_another_module(trial)), SPECS,
@@ -311,7 +313,7 @@ REFUSED = {
         replace(trial, agent="flat", thesis=True), SPECS,
     ),
     "'tiny' was trained on goal and cannot infer 'velocity'. Choose": lambda trial: (
-        replace(trial, agent="oracle", robot=None, tracker=None, flat=None), [TaskSpec("velocity", 1.0)],
+        replace(trial, agent="oracle", robot=None, tracker=None, flat=None), [TaskSpec("velocity", (1.0,))],
     ),
     "unknown agent 'resue'": lambda trial: (replace(trial, agent="resue"), SPECS),
     "its encoder sees yaw, which 'cheetah' does not have": lambda trial: (

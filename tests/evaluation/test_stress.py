@@ -7,11 +7,12 @@ import pytest
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, load_robot
 from rebody.cli.main import run
+from rebody.control.command import commands_within
 from rebody.control.sac import Actor, SACConfig
-from rebody.control.tracker import Command, Tracker, tracker_observation
+from rebody.control.tracker import Tracker, command_inputs
 from rebody.evaluation import stress as module
 from rebody.evaluation.stress import Countdown, stress
-from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.tasks import SHIPPED
 
 
 @pytest.fixture(autouse=True)
@@ -22,11 +23,9 @@ def in_short(monkeypatch):
 
 def untrained(spec):
     """A tracker that hardly acts."""
-    batch = RobotBatch(spec, 1, threads=1)
-    joints = batch.proprioception()
-    still = Command(np.zeros(1, np.int32), np.zeros(1, np.float32))
-    size = tracker_observation(joints, still, spec.reach).shape[-1]
-    return Tracker(Actor(size, spec.model.nu, SACConfig(hidden=(4,)), jax.random.key(0)), spec.reach)
+    families = commands_within(spec.reach, SHIPPED)
+    size = spec.tracker_inputs + command_inputs(families)
+    return Tracker(Actor(size, spec.model.nu, SACConfig(hidden=(4,)), jax.random.key(0)), families)
 
 
 def test_a_hopper_that_does_nothing_falls_and_a_cheetah_does_not():
@@ -62,7 +61,7 @@ def told(monkeypatch):
     told = []
 
     def spy(controller, batch, subgoal):
-        told.append((batch.x, subgoal.slot, subgoal.value))
+        told.append((batch.qpos[:, 0].copy(), subgoal.slot, subgoal.value[:, 0]))
         follow(controller, batch, subgoal)
 
     monkeypatch.setattr(module, "follow", spy)
@@ -73,13 +72,14 @@ def test_subgoals_lie_within_reach_and_change_as_often_as_they_should(told):
     spec = load_robot("cheetah")
     stress(untrained(spec), spec, 30)
     x, slot, value = (np.array(of_step) for of_step in zip(*told, strict=True))
-    assert set(np.unique(slot)) == {GOAL, VELOCITY, STAND}
+    families = commands_within(spec.reach, SHIPPED)
+    assert set(np.unique(slot)) == set(range(len(families))) == {0, 1, 2}
     is_new = np.concatenate([np.ones((1, 30), bool), np.diff(value, axis=0) != 0])
     between = np.concatenate([np.diff(np.flatnonzero(of_robot)) for of_robot in is_new.T])
     assert between.min() >= 20  # 1 s
     assert is_new[1:].any(axis=0).mean() > 0.1
-    asked = np.where(slot == GOAL, value - x, value)[is_new]
-    ends = np.array([(-spec.reach.distance, spec.reach.distance), spec.reach.speed, spec.reach.pitch])
+    asked = np.where(slot == families.index("goal"), value - x, value)[is_new]
+    ends = np.array([(*family.range.low, *family.range.high) for family in families])
     low, high = ends[slot[is_new]].T
     assert ((asked >= low - 1e-5) & (asked <= high + 1e-5)).all()
     assert (np.abs(asked) > 0.5 * high).any()

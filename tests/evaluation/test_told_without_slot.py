@@ -6,12 +6,14 @@ import pytest
 
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate
-from rebody.evaluation.evaluate import check_trial, take_yardsticks
+from rebody.evaluation.evaluate import take_yardsticks
+from rebody.evaluation.trial import check_trial
+from rebody.tasks import FamilySet, line
 from rebody.tasks.task_file import Switch, TaskSpec
 from rebody.viewer.session import Session
 
-JUMP, STAND = TaskSpec("jump", 1.5), TaskSpec("stand", 1.0)
-LATER = TaskSpec("goal", 2.0, Switch(1.0, "jump", 1.5))
+JUMP, STAND = TaskSpec("jump", (1.5,)), TaskSpec("stand", (1.0,))
+LATER = TaskSpec("goal", (2.0,), Switch(1.0, "jump", (1.5,)))
 
 
 @pytest.mark.parametrize(("specs", "what"), [([JUMP], "jump"), ([LATER], "jump"), ([STAND, JUMP, JUMP], "stand, jump")])
@@ -20,14 +22,14 @@ def test_an_oracle_is_refused(trial, specs, what):
     oracle = replace(trial, agent="oracle")
     for refused in (check_trial, lambda trial, specs: evaluate(trial, specs, 1)):
         with pytest.raises(RebodyError, match=said):
-            refused(oracle, [TaskSpec("velocity", 1.0), *specs])
+            refused(oracle, [TaskSpec("velocity", (1.0,)), *specs])
 
 
 def test_on_the_live_page_too(trial):
-    session = Session(replace(trial, agent="oracle"), TaskSpec("goal", 2.0))
+    session = Session(replace(trial, agent="oracle"), TaskSpec("goal", (2.0,)))
     with pytest.raises(RebodyError, match="'oracle' is told jump"):
         session.set_task(JUMP)
-    assert session.task == TaskSpec("goal", 2.0)
+    assert session.task == TaskSpec("goal", (2.0,))
 
 
 @pytest.mark.parametrize("agent", ["reuse", "readout", "bayes", "flat"])
@@ -38,7 +40,7 @@ def test_the_others_cannot_infer_it(trial, agent):
 
 @pytest.mark.parametrize("agent", ["reuse", "readout", "bayes", "flat"])
 def test_nor_has_their_module_more_families_than_slots(trial, agent):
-    jumps = replace(trial.inference.contract, target_ranges={"jump": (1.0, 2.0)})
+    jumps = replace(trial.inference.contract, families=FamilySet((line.JUMP,)))
     with pytest.raises(RebodyError, match="the tracker has no slot for jump"):
         check_trial(replace(trial, agent=agent, inference=replace(trial.inference, contract=jumps)), [JUMP])
 

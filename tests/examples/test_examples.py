@@ -26,8 +26,8 @@ def test_driving():
     """The task changes in mid-episode; what is believed follows."""
     seen = list(load("driving.py").drive((("goal", 2.0), ("velocity", -1.5)), seconds=2.0))
     assert [time for time, *_ in seen] == pytest.approx([1.0, 2.0, 3.0, 4.0])
-    for _, task, believed, *_ in (seen[1], seen[3]):
-        assert believed == (task[0], pytest.approx(task[1], abs=0.3))
+    for _, (family, target), believed, *_ in (seen[1], seen[3]):
+        assert believed == (family, pytest.approx((target,), abs=0.3))
 
 
 def test_baselines():

@@ -18,7 +18,7 @@ COMMANDS = re.findall(r"^    \.venv/bin/rebody (.*)$", PAGE, re.MULTILINE)
 
 @pytest.mark.parametrize(
     ("block", "said"),
-    list(zip(BLOCKS[:2], (r"^goal [56]\.\d+ ", r"^\(16,\) (goal|velocity)$"), strict=True)),
+    list(zip(BLOCKS[:2], (r"^goal \([56]\.\d+,\) ", r"^\(16,\) (goal|velocity)$"), strict=True)),
     ids=["live", "environment"],
 )
 def test_python(block, said, capsys):

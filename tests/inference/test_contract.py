@@ -8,18 +8,18 @@ import pytest
 from rebody.errors import RebodyError
 from rebody.inference.contract import Contract
 from rebody.store.typed import typed
-from rebody.tasks import GOAL, VELOCITY
+from rebody.tasks import FamilySet
+from rebody.tasks.line import GOAL, VELOCITY
 
-CONTRACT = Contract(
-    fields=("x", "pitch"), window=32, target_ranges={"velocity": (-3.0, 3.0), "goal": (-10.0, 10.0)}, reward="relative"
-)
+CONTRACT = Contract(fields=("x", "pitch"), window=32, families=FamilySet((VELOCITY, GOAL)))
 FIELDS, SLOTS = ("x", "vx", "pitch"), ("goal", "velocity")
 
 
 def test_survives_its_file():
     again = typed(json.loads(json.dumps(asdict(CONTRACT))), Contract)
     assert again == CONTRACT
-    assert again.families == (GOAL, VELOCITY)
+    assert again.families.names == ("velocity", "goal")
+    assert again.families.named("goal") == GOAL  # whole: ranges, law, directions
 
 
 def test_a_body_that_fits():

@@ -7,7 +7,7 @@ import pytest
 
 from rebody.inference import Encoder
 from rebody.inference.encoder import VARIANCE_RANGE
-from rebody.types import DECISION_DT, GLOBAL_FIELDS, GlobalState, Transition
+from rebody.types import DECISION_DT, GLOBAL_FIELDS, GlobalState, Transition, global_state
 
 WINDOW, TIME = 5, 13
 SEEN = ("x", "vx")
@@ -186,3 +186,39 @@ def test_a_split_latent_steps_as_it_was_trained(walk):
     for window in (None, TIME):
         split = make(latent=4, kinds=2, window=window)
         assert_same(stepped(split, walk), along(split, walk))
+
+
+def heading_encoder(**changes):
+    settings = {"window": WINDOW, "latent": 3, "kinds": 1, "units": 8} | changes
+    return eqx.filter_jit(
+        lambda key: Encoder(fields=("x", "yaw"), scales=(10.0, 2.0), reward_scale=10.0, key=key, **settings)
+    )(jax.random.key(0))
+
+
+def test_a_heading_is_seen_as_sine_and_cosine_and_turns_the_shorter_way():
+    one = np.ones(1, np.float32)
+    previous, state = (global_state(x=one, yaw=yaw * one) for yaw in (3.1, -3.1))
+    turn = 2 * np.pi - 6.2
+    # x / 10, sine and cosine, changes per second of x / 10 and yaw / 2, r / 10, compressed r / 10
+    expected = [0.1, np.sin(-3.1), np.cos(-3.1), 0.0, turn / 2 / DECISION_DT, -0.4, 0.3 * np.arcsinh(-20)]
+    found = heading_encoder().features(Transition(previous, -4 * one, state))
+    np.testing.assert_allclose(found, [expected], rtol=1e-4, atol=1e-5)
+
+
+def test_a_turn_more_changes_no_belief(walk):
+    encoder, rng = heading_encoder(), np.random.default_rng(0)
+    turned = eqx.tree_at(
+        lambda w: [w.previous.yaw, w.state.yaw],
+        walk,
+        replace_fn=lambda yaw: yaw + (2 * np.pi * rng.integers(-2, 3, yaw.shape)).astype("f4"),
+    )
+    one, other = along(encoder, walk), along(encoder, turned)
+    np.testing.assert_allclose(one.mean, other.mean, atol=1e-3)
+    np.testing.assert_allclose(one.variance, other.variance, rtol=1e-2)
+    half = eqx.tree_at(lambda w: w.state.yaw, walk, replace_fn=lambda yaw: yaw + np.float32(np.pi))
+    assert np.abs(along(encoder, half).mean - one.mean).max() > 1e-3
+
+
+def test_with_a_heading_it_steps_as_it_was_trained(walk):
+    encoder = heading_encoder(window=TIME)
+    assert_same(stepped(encoder, walk), along(encoder, walk))

@@ -13,12 +13,17 @@ import scipy.stats
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig, InferenceModule
 from rebody.inference.decoder import Decoder, Prediction
-from rebody.inference.module import BASE_TASKS, FARTHEST_PLACE, Evidence, loss
+from rebody.inference.module import FARTHEST_PLACE, Evidence, loss
 from rebody.inference.prior import SplitPrior, unit_gaussian
+from rebody.ranges import Box
+from rebody.tasks import FamilySet, Quantity
+from rebody.tasks.line import GOAL, LINE, STAND, VELOCITY
 from rebody.types import Belief, Transition, global_state
 
 CONFIG = InferenceConfig(window=6, units=32, batch_size=16, decoded=4)
 UPDATES = 400
+GOALS = FamilySet((GOAL,))
+THREE = FamilySet((GOAL, VELOCITY, STAND))
 
 
 def states(x):
@@ -49,7 +54,7 @@ def evidence():
 
 @pytest.fixture(scope="module")
 def untrained():
-    return eqx.filter_jit(InferenceModule)(CONFIG, 1, jax.random.key(0))
+    return eqx.filter_jit(lambda key: InferenceModule(CONFIG, GOALS, 1, key))(jax.random.key(0))
 
 
 @pytest.fixture(scope="module")
@@ -121,9 +126,16 @@ def test_what_is_learned_is_the_task_of_the_window(trained, measured, evidence):
     assert wrong > 3 * right
 
 
+def made(families, fields, scales, latent, kinds):
+    """A decoder of one action."""
+    return eqx.filter_jit(lambda key: Decoder(families, fields, scales, 1, latent, kinds, 8, key=key))(
+        jax.random.key(0)
+    )
+
+
 @pytest.fixture(scope="module")
 def decoder():
-    return eqx.filter_jit(Decoder)(2, 1, 3, 0, 8, key=jax.random.key(0))
+    return made(GOALS, ("x", "vx"), (1.0, 1.0), latent=3, kinds=0)
 
 
 def test_dynamics_do_not_shape_the_latent_and_rewards_do(decoder):
@@ -152,7 +164,7 @@ def test_reward_is_a_weighted_distance_from_a_point_linear_in_the_latent(decoder
 @pytest.fixture(scope="module")
 def split_decoder():
     """Of a latent whose first two dimensions say what kind of task it is, and two for each field how much is asked."""
-    return eqx.filter_jit(Decoder)(3, 1, 8, 2, 8, key=jax.random.key(0))
+    return made(THREE, ("x", "vx", "pitch"), (1.0, 1.0, 1.0), latent=8, kinds=2)
 
 
 def of_experts(decoder, state, amount):
@@ -285,12 +297,14 @@ def test_the_state_is_predicted_from_the_last_belief_alone(trained, measured, ev
     assert early["reward_error"] != as_it_was["reward_error"]  # which all beliefs have a part in
 
 
+BASE_TASKS = THREE.base_tasks
 LABELLED = replace(CONFIG, label_weight=0.5)
 
 
 @pytest.fixture(scope="module")
 def labelled():
-    return eqx.filter_jit(InferenceModule)(LABELLED, 1, jax.random.key(0))
+    """It tells of three families, two directions each, though it sees x alone."""
+    return eqx.filter_jit(lambda key: InferenceModule(LABELLED, THREE, 1, key))(jax.random.key(0))
 
 
 @pytest.fixture(scope="module")
@@ -344,7 +358,7 @@ def test_labels_shape_the_encoder_and_only_where_they_are_used(labelled, untrain
 def test_a_split_module_learns_what_kind_it_is_by_its_prior(evidence):
     """The kinds' divergence is weighted, the others' is not."""
     config = replace(CONFIG, latent=3, kinds=1, kl_weight=0.2)
-    module = eqx.filter_jit(InferenceModule)(config, 1, jax.random.key(0))
+    module = eqx.filter_jit(lambda key: InferenceModule(config, GOALS, 1, key))(jax.random.key(0))
     priors = [SplitPrior(unit_gaussian, 1, weight) for weight in (0.0, 5.0)]
     found = [eqx.filter_jit(loss)(module, evidence, prior, config, jax.random.key(1)) for prior in priors]
     belief = module.encoder.along(evidence.window)
@@ -400,16 +414,28 @@ def test_a_belief_that_is_not_split_says_what_it_says(decoder):
     assert decoder.interpret(belief) is belief
 
 
-def test_fields_share_the_amounts_of_a_split_latent_evenly():
+def test_families_share_the_amounts_of_a_split_latent_evenly():
     uneven = InferenceConfig(fields=("x", "vx"), scales=(1.0, 1.0), latent=5, kinds=2)
-    with pytest.raises(RebodyError, match="leaves 3, which 2 fields cannot share"):
-        InferenceModule(uneven, 1, jax.random.key(0))
+    with pytest.raises(RebodyError, match="leaves 3, which 2 families cannot share"):
+        InferenceModule(uneven, FamilySet((GOAL, VELOCITY)), 1, jax.random.key(0))
+
+
+def test_families_that_the_encoder_does_not_see_are_refused():
+    split = InferenceConfig(fields=("x", "vx"), scales=(1.0, 1.0), latent=8, kinds=2)
+    with pytest.raises(RebodyError, match=r"--inference.fields: x, vx, but families are about pitch as well"):
+        InferenceModule(split, THREE, 1, jax.random.key(0))
+
+
+def test_families_in_the_frame_of_the_heading_are_not_learned():
+    along = replace(VELOCITY, quantity=replace(VELOCITY.quantity, frame="heading"))
+    with pytest.raises(RebodyError, match="'velocity' is told in the frame of the heading, which no module learns"):
+        InferenceModule(CONFIG, FamilySet((along,)), 1, jax.random.key(0))
 
 
 def test_places_beyond_what_a_body_visits_cost(evidence, monkeypatch):
     """An account of any task by a place far away, from where all distances are alike, does not pay."""
     config = replace(CONFIG, kinds=1, latent=2)
-    module = InferenceModule(config, 1, jax.random.key(0))
+    module = InferenceModule(config, GOALS, 1, jax.random.key(0))
     module = eqx.tree_at(
         lambda m: (m.decoder.experts[0].reference.weights[0], m.decoder.experts[0].reference.biases[0]),
         module,
@@ -419,3 +445,89 @@ def test_places_beyond_what_a_body_visits_cost(evidence, monkeypatch):
     monkeypatch.setattr("rebody.inference.module.FARTHEST_PLACE", 4.0)
     free = float(loss(module, evidence, unit_gaussian, config, jax.random.key(1))[0])
     assert held - free == pytest.approx((4.0 - FARTHEST_PLACE) ** 2, rel=1e-4)
+
+
+# headings: as sine and cosine, and by the shorter way round
+
+DOCK = replace(
+    GOAL, name="dock", quantity=Quantity("x_yaw", ("x", "yaw"), "m, rad", "place and heading"),
+    targets=(Box((-6.0, -3.0), (6.0, 3.0)),), directions=(),
+)  # fmt: skip
+FIELDS, SCALES = ("x", "vx", "yaw"), (10.0, 3.0, 2.0)
+
+
+@pytest.fixture(scope="module")
+def turning():
+    """A decoder of goals and of places with a heading."""
+    return made(FamilySet((GOAL, DOCK)), FIELDS, SCALES, latent=8, kinds=2)
+
+
+def test_a_family_of_several_numbers_has_one_expert(turning):
+    """Which is paid for the Euclidean distance in units of the scales, the heading by the shorter way round."""
+    latent, state = points(3)
+    amount, expert = latent[:, 5:], turning.experts[1]
+    place = np.asarray(expert.place(amount))
+    weight = np.log1p(np.exp(np.asarray(expert.weights(amount))))
+    turn = (2.0 * (state[:, 2] - place[:, 1]) + np.pi) % (2 * np.pi) - np.pi
+    distance = np.hypot(state[:, 0] - place[:, 0], turn / 2.0)
+    np.testing.assert_allclose(turning.reward(state, latent).mean[:, 1], -weight[:, 0] * distance, rtol=1e-4)
+    said = amount @ np.asarray(expert.reference.weights[0]) + np.asarray(expert.reference.biases[0])
+    np.testing.assert_allclose(place, np.stack([said[:, 0], np.arctan2(said[:, 1], said[:, 2]) / 2.0], -1), rtol=1e-4)
+    assert [len(each.fields) for each in turning.experts] == [1, 2]
+
+
+def test_a_turn_more_is_none(turning):
+    latent, state = points(3)
+    once_more = state + np.array([0.0, 0.0, 2 * np.pi / SCALES[2]], "f4")
+    for one, other in zip(
+        jax.tree.leaves(turning.reward(state, latent)), jax.tree.leaves(turning.reward(once_more, latent)), strict=True
+    ):
+        np.testing.assert_allclose(one, other, atol=1e-4)
+    action = np.zeros((6, 1), "f4")
+    apart = turning.next_state(once_more, action, latent) - turning.next_state(state, action, latent)
+    np.testing.assert_allclose(apart, np.tile([0, 0, np.pi], (6, 1)), atol=1e-4)
+
+
+def test_a_heading_is_interpreted_as_draws_would_be(turning):
+    """Where the belief is about as sure as one that has heard something."""
+    rng, (latent, _) = np.random.default_rng(1), points(3)
+    variance = rng.uniform(1e-4, 1e-3, latent.shape).astype("f4")
+    said = turning.interpret(Belief(latent, variance))
+    assert said.mean.shape == said.variance.shape == (6, 2 + 3)
+    draws = latent + np.sqrt(variance) * rng.standard_normal((20_000, *latent.shape)).astype("f4")
+    places = np.asarray(turning.places(draws[..., 2:]))
+    mean = np.asarray(said.mean)[:, 2:]
+    turns = np.pi * np.round((places[..., 2] - mean[:, 2]) / np.pi)  # scaled: half a turn's 2 pi / 2
+    places = np.concatenate([places[..., :2], (places[..., 2] - turns)[..., None]], axis=-1)
+    np.testing.assert_allclose(said.variance[:, 2:], places.var(axis=0), rtol=0.1)
+    np.testing.assert_allclose(mean, places.mean(axis=0), atol=0.02)
+
+
+def test_the_error_of_a_state_knows_no_turns():
+    config = InferenceConfig(
+        fields=FIELDS, scales=SCALES, window=6, units=8, batch_size=4, decoded=3, latent=6, kinds=2
+    )
+    module = eqx.filter_jit(lambda key: InferenceModule(config, FamilySet((GOAL, DOCK)), 1, key))(jax.random.key(0))
+    rng = np.random.default_rng(0)
+
+    def random_states(shape):
+        return global_state(**{name: rng.uniform(-3, 3, shape).astype("f4") for name in FIELDS})
+
+    window = Transition(random_states((4, 6)), rng.uniform(-3, 0, (4, 6)).astype("f4"), random_states((4, 6)))
+    heard = Evidence(
+        window, np.zeros((4, 6), np.int32), np.ones((4, 6, 3), bool), random_states((4, 3)),
+        np.zeros((4, 3, 1), "f4"), rng.uniform(-3, 0, (4, 3)).astype("f4"), random_states((4, 3)),
+    )  # fmt: skip
+    turned = eqx.tree_at(
+        lambda e: [state.yaw for state in (e.window.previous, e.window.state, e.previous, e.state)],
+        heard,
+        replace_fn=lambda yaw: yaw + (2 * np.pi * rng.integers(-2, 3, yaw.shape)).astype("f4"),
+    )
+    measure = eqx.filter_jit(lambda evidence: loss(module, evidence, unit_gaussian, config, jax.random.key(1)))
+    for one, other in zip(jax.tree.leaves(measure(heard)), jax.tree.leaves(measure(turned)), strict=True):
+        assert float(one) == pytest.approx(float(other), rel=1e-3)
+
+
+def test_there_are_logits_for_all_base_tasks():
+    module = InferenceModule(replace(CONFIG, label_weight=0.1), LINE, 1, jax.random.key(0))
+    assert module.labeller.weights[-1].shape == (2, 8)

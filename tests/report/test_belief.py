@@ -7,7 +7,9 @@ from PIL import Image
 
 from rebody.agents.belief import Reading
 from rebody.evaluation.logs import BeliefOverTime, Decisions
+from rebody.ranges import Box
 from rebody.report import plot_beliefs
+from rebody.tasks import SHIPPED, Family, FamilySet, Quantity
 from rebody.types import Belief
 
 TIME = 25
@@ -20,18 +22,32 @@ def assert_drawn(path):
     assert not plt.get_fignums()
 
 
-def run_of(fields, families, latent=3, clusters=0):
-    time = 0.1 * np.arange(TIME + 1)
+def own(name, *components):
+    """A family of vectors."""
+    targets = (Box((-3.0,) * len(components), (3.0,) * len(components)),)
+    return Family(name, Quantity(name, components, "m", name), targets, floor=0.5, tolerance=0.3)
+
+
+KNOWN = SHIPPED.beside(FamilySet((own("place", "x", "y"), own("lean", "x", "pitch"))))
+
+
+def run_of(fields, names, latent=3, clusters=0):
+    time, families = 0.1 * np.arange(TIME + 1), KNOWN.only(tuple(names))
 
     def reading(i):
         mean = np.sin(0.1 * i * np.arange(1, latent + 1))
         shares = {k: float(k == 0) for k in range(clusters)}
         believed = families[i * len(families) // TIME]
-        base_tasks = {(family, sign): 0.5 * (family == believed) for family in families for sign in (1, -1)}
-        return Reading(believed, 2.0, base_tasks, shares, Belief(mean, np.ones(latent)))
+        base_tasks = {
+            (family.name, direction): (family == believed) / len(family.direction_names)
+            for family in families
+            for direction in family.direction_names
+        }
+        target = tuple(2.0 + 0.1 * np.arange(believed.size))
+        return Reading(believed.name, target, base_tasks, shares, Belief(mean, np.ones(latent)))
 
     decisions = Decisions(time, {field: np.sin(time) for field in fields}, -np.ones(TIME))
-    return BeliefOverTime("tiny", decisions, [reading(i) for i in range(TIME)], believed=TIME)
+    return BeliefOverTime("tiny", families, decisions, [reading(i) for i in range(TIME)], believed=TIME)
 
 
 @pytest.mark.parametrize(
@@ -41,8 +57,19 @@ def run_of(fields, families, latent=3, clusters=0):
         run_of(("x", "vx"), ["goal", "velocity"], clusters=2),
         run_of(("x", "vx", "pitch"), ["goal", "velocity", "stand"], clusters=5),
         run_of(("x",), ["goal", "velocity"]),
+        run_of(("x", "y"), ["place", "goal"]),
+        run_of(("x", "pitch"), ["lean"]),
+        run_of(("pitch",), ["lean", "place"]),
     ],
-    ids=["one family, one number", "two families", "three families", "a velocity that is not seen"],
+    ids=[
+        "one family, one number",
+        "two families",
+        "three families",
+        "a velocity that is not seen",
+        "a plane",
+        "a vector",
+        "vectors that are not seen",
+    ],
 )
 def test_drawn_whole(run, tmp_path):
     path = tmp_path / "new" / "belief.png"
@@ -54,6 +81,6 @@ def test_drawn_whole(run, tmp_path):
 def test_a_family_that_was_never_believed(tmp_path):
     run = run_of(("x", "vx"), ["goal", "velocity"])
     for i, reading in enumerate(run.readings):
-        run.readings[i] = Reading("goal", 2.0, reading.base_tasks, {}, reading.latent)
+        run.readings[i] = Reading("goal", (2.0,), reading.base_tasks, {}, reading.latent)
     plot_beliefs(run, tmp_path / "belief.png")
     assert_drawn(tmp_path / "belief.png")

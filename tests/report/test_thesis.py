@@ -14,7 +14,7 @@ from rebody.report.thesis import FIGURES, catalogue, data, episodes, find_figure
 from rebody.report.thesis.data import join, on_goals, save, split, trajectories
 from rebody.report.thesis.learning import HIGH_LEVELS
 from rebody.report.thesis.trainings import training_log
-from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.tasks.line import GOAL, LINE, STAND, VELOCITY
 from rebody.tasks.task_file import Switch, TaskSpec
 
 CAPTION = "What is seen, in so many words that a line does not hold all of them. " * 4 + "\nMade by a test."
@@ -30,7 +30,7 @@ def episodes_of(latent, targets=(-9.0, 0.5, 4.0), decision_s=0.1, time=40):
         "velocity_m_s": np.gradient(position, axis=0) / 0.1,
         "pitch_rad": position,
         "latent": np.stack([(i + 1) * position / 10 for i in range(latent)], axis=-1),
-        "family": np.full(len(targets), GOAL),
+        "family": np.full(len(targets), LINE.index(GOAL.name)),
         "target": np.array(targets),
         "decision_s": np.array(decision_s),
     }
@@ -48,7 +48,7 @@ def several_of(episodes=3, families=(GOAL, VELOCITY)):
     targets = np.concatenate([side * np.arange(2.0, 2.0 + episodes) for side in (1, -1) * len(families)])
     data = episodes_of(6, targets)
     rng = np.random.default_rng(0)
-    family = np.repeat(families, 2 * episodes)
+    family = np.repeat([LINE.index(each.name) for each in families], 2 * episodes)
     return data | {"family": family} | {name: rng.normal(size=(6, len(targets), 2)) for name in ("tsne", "pca")}
 
 
@@ -216,7 +216,7 @@ def test_trajectories_are_those_of_the_trial(trial, changes, decision_s):
     assert log["position_m"].shape == log["velocity_m_s"].shape == (30, 2)
     assert log["latent"].shape == (30, 2, 2)
     np.testing.assert_array_equal(log["target"], [-3.0, 2.0])
-    np.testing.assert_array_equal(log["family"], [GOAL, GOAL])
+    np.testing.assert_array_equal(log["family"], [LINE.index(GOAL.name)] * 2)
     assert float(log["decision_s"]) == pytest.approx(decision_s)
     assert np.abs(log["position_m"][-1]).min() > 1e-3
     displacement = np.diff(log["position_m"], axis=0) / 0.1
@@ -225,12 +225,12 @@ def test_trajectories_are_those_of_the_trial(trial, changes, decision_s):
 
 def test_trajectories_are_of_the_task_that_an_episode_ends_with(trial):
     toy = replace(trial, robot=None, tracker=None, flat=None, agent="oracle")
-    log = trajectories(toy, [TaskSpec("goal", 3.0), TaskSpec("goal", 3.0, Switch(1.0, "goal", -1.0))])
+    log = trajectories(toy, [TaskSpec("goal", (3.0,)), TaskSpec("goal", (3.0,), Switch(1.0, "goal", (-1.0,)))])
     np.testing.assert_array_equal(log["target"], [3.0, -1.0])
 
 
 def test_long_trajectories_are_thinned_out(trial, monkeypatch):
-    specs = [TaskSpec("goal", 2.0)]
+    specs = [TaskSpec("goal", (2.0,))]
     whole = trajectories(trial, specs)
     monkeypatch.setattr(data, "POINTS", 12)
     thin = trajectories(trial, specs)
@@ -251,7 +251,7 @@ def test_the_latents_that_are_shown_are_those_of_evenly_spaced_tasks(monkeypatch
     monkeypatch.setattr(episodes, "load_inference", lambda name: trial.inference)
     monkeypatch.setattr(episodes, "trajectories", listen)
     log = episodes.projections()
-    of_family = {name: sorted(spec.target for spec in asked if spec.family == name) for name in ("goal", "velocity")}
+    of_family = {name: sorted(spec.target[0] for spec in asked if spec.family == name) for name in ("goal", "velocity")}
     np.testing.assert_allclose(of_family["goal"], np.sort(np.r_[1, -1][:, None] * np.linspace(2, 15, 12), axis=None))
     np.testing.assert_allclose(of_family["velocity"], np.sort(np.r_[1, -1][:, None] * np.linspace(1, 3, 12), axis=None))
     shown = episodes.on_toy()["latent"][episodes.FROM :: episodes.EVERY]
@@ -262,7 +262,8 @@ def test_the_latents_that_are_shown_are_those_of_evenly_spaced_tasks(monkeypatch
 
 
 def test_each_base_task_has_its_name_and_colour():
-    data = {"family": np.array([GOAL, GOAL, VELOCITY, VELOCITY]), "target": np.array([3.0, -3.0, 1.0, -1.0])}
+    family = [LINE.index(each.name) for each in (GOAL, GOAL, VELOCITY, VELOCITY)]
+    data = {"family": np.array(family), "target": np.array([3.0, -3.0, 1.0, -1.0])}
     names = [panels.BASE_TASKS[label][0] for label in panels.labels(data)]
     assert names == ["goal in front", "goal behind", "run forward", "run backward"]
     assert len({colour for _, colour in panels.BASE_TASKS.values()}) == len(panels.BASE_TASKS)

@@ -37,8 +37,8 @@ def small(monkeypatch):
 def test_a_film_lasts_as_long_as_its_episode(trial, tmp_path):
     heard = []
     path = tmp_path / "new" / "film.mp4"
-    episode = film(trial, TaskSpec("goal", 2.0), path, heard.append)
-    assert episode.target == 2.0
+    episode = film(trial, TaskSpec("goal", (2.0,)), path, heard.append)
+    assert episode.target == [2.0]
     assert len(episode.time_s) == 30
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(path)
     assert frames == SECONDS * FRAMES_PER_S
@@ -57,13 +57,13 @@ def test_a_film_that_fails_leaves_the_old_one(trial, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        film(trial, TaskSpec("goal", 2.0), path, fail)
+        film(trial, TaskSpec("goal", (2.0,)), path, fail)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_the_plot_below_fits_and_shows_how_far_it_is(trial):
-    episode = evaluate(trial, [TaskSpec("goal", 2.0)], 1).episodes[0]
+    episode = evaluate(trial, [TaskSpec("goal", (2.0,))], 1).episodes[0]
     early, late = (video._plot(episode, until) for until in (2, 30))
     assert early.shape == late.shape == (PLOT_HEIGHT, WIDTH, 3)
     assert (early != late).any()
@@ -74,7 +74,7 @@ def test_without_an_ffmpeg_that_runs_no_episode_is_run(program, trial, tmp_path,
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", program)
     monkeypatch.setattr(video, "evaluate", None)
     with pytest.raises(RebodyError, match=r"videos need ffmpeg.*pip install --force-reinstall imageio-ffmpeg"):
-        film(trial, TaskSpec("goal", 2.0), tmp_path / "film.mp4")
+        film(trial, TaskSpec("goal", (2.0,)), tmp_path / "film.mp4")
 
 
 @pytest.mark.parametrize("error", [OSError("Broken pipe"), RuntimeError("No valid H.264 encoder"), IndexError()])
@@ -86,7 +86,7 @@ def test_an_ffmpeg_that_fails_is_one_message(error, trial, tmp_path, monkeypatch
     monkeypatch.setattr(video.imageio_ffmpeg, "write_frames", failing)
     monkeypatch.setattr(video, "_frames", lambda *_: iter([(1.0, np.zeros((8, 8, 3), np.uint8))]))
     with pytest.raises(RebodyError, match="ffmpeg could not write a video into"):
-        film(trial, TaskSpec("goal", 2.0), tmp_path / "film.mp4")
+        film(trial, TaskSpec("goal", (2.0,)), tmp_path / "film.mp4")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -109,6 +109,6 @@ def test_a_film_that_was_not_finished_leaves_the_old_one(trial, tmp_path, monkey
 
     monkeypatch.setattr(imageio_ffmpeg, "write_frames", cut_short)
     with pytest.raises(RebodyError, match="Is the disk full"):
-        film(trial, TaskSpec("goal", 2.0), path)
+        film(trial, TaskSpec("goal", (2.0,)), path)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]

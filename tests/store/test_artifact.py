@@ -101,8 +101,8 @@ def test_broken_manifest(folder, text):
 
 def test_other_format_version(folder):
     manifest = json.loads((folder / "manifest.json").read_text())
-    (folder / "manifest.json").write_text(json.dumps(manifest | {"format_version": 2}))
-    with pytest.raises(RebodyError, match="format version 2; this rebody reads version 1"):
+    (folder / "manifest.json").write_text(json.dumps(manifest | {"format_version": 3}))
+    with pytest.raises(RebodyError, match="format version 3; this rebody reads version 2"):
         load_artifact(folder, "inference")
 
 

@@ -3,34 +3,70 @@
 import jax
 import numpy as np
 import pytest
+from tests.tasks.conftest import PLACE
 
-from rebody.errors import RebodyError
-from rebody.tasks import GOAL, VELOCITY, BaseTask, TaskDistribution
+from rebody.ranges import Box, interval
+from rebody.tasks import FamilySet
+from rebody.tasks.family_set import draw, sample, sample_episodes
+from rebody.tasks.line import GOAL, VELOCITY
 
-TASKS = TaskDistribution((BaseTask("velocity", 1.0, 3.0), BaseTask("goal", -15.0, -2.0), BaseTask("goal", 2.0, 15.0)))
+FAMILIES = FamilySet((GOAL.within(interval(-15.0, -2.0), interval(2.0, 15.0)), VELOCITY.within(interval(1.0, 3.0))))
+OF_GOAL, OF_VELOCITY = 0, 1
+BASE_TASKS = [(i, box) for i, family in enumerate(FAMILIES) for box in family.targets]
+WIDE = FamilySet((PLACE.within(Box((1.0, -4.0), (3.0, -2.0)), Box((-9.0, 0.0), (9.0, 1.0))), GOAL))
 
 
 @pytest.fixture(scope="module")
 def drawn():
-    return TASKS.sample(jax.random.key(0), (4, 3000))
+    return sample(FAMILIES, jax.random.key(0), (4, 3000))
 
 
 def test_shape_and_families(drawn):
-    assert drawn.family.shape == drawn.target.shape == (4, 3000)
-    assert TASKS.families == (GOAL, VELOCITY)
-    assert TASKS.target_range("goal") == (-15.0, 15.0)
+    assert drawn.family.shape == (4, 3000)
+    assert drawn.target.shape == (4, 3000, 1)
+    assert set(np.unique(drawn.family)) == {OF_GOAL, OF_VELOCITY}
 
 
-@pytest.mark.parametrize("base", TASKS.base_tasks)
-def test_each_base_task_is_a_third_and_uniform_in_its_range(drawn, base):
-    family = GOAL if base.family == "goal" else VELOCITY
-    mine = (drawn.family == family) & (np.sign(drawn.target) == np.sign(base.low))
-    targets = np.asarray(drawn.target)[np.asarray(mine)]
-    assert len(targets) == pytest.approx(4000, abs=200)  # 4 standard deviations
-    assert (targets >= base.low).all()
-    assert (targets <= base.high).all()
-    quartiles = np.quantile((targets - base.low) / (base.high - base.low), [0.25, 0.5, 0.75])
-    np.testing.assert_allclose(quartiles, [0.25, 0.5, 0.75], atol=0.03)
+def assert_a_share_and_uniform(family, target, which, box, count):
+    """Each number between its ends, and zeros behind."""
+    size = box.size
+    inside = np.all((target[:, :size] >= box.low) & (target[:, :size] <= box.high), axis=-1)
+    mine = target[(family == which) & inside]
+    assert len(mine) == pytest.approx(count, abs=200)  # 4 standard deviations
+    assert not mine[:, size:].any()
+    share = (mine[:, :size] - box.low) / np.subtract(box.high, box.low)
+    quartiles = np.quantile(share, [0.25, 0.5, 0.75], axis=0)
+    np.testing.assert_allclose(quartiles, np.tile([[0.25], [0.5], [0.75]], size), atol=0.03)
+
+
+@pytest.mark.parametrize(("which", "box"), BASE_TASKS)
+def test_each_base_task_is_a_third_and_uniform_in_its_range(drawn, which, box):
+    family, target = np.asarray(drawn.family).ravel(), np.asarray(drawn.target).reshape(-1, 1)
+    assert_a_share_and_uniform(family, target, which, box, 4000)
+
+
+@pytest.mark.parametrize("of_numpy", [False, True])
+def test_vectors_are_uniform_in_their_boxes(of_numpy):
+    if of_numpy:
+        rng = np.random.default_rng(0)
+        tasks = [draw(WIDE, rng) for _ in range(12_000)]
+        family, target = (np.stack(part) for part in zip(*((t.family, t.target) for t in tasks), strict=True))
+    else:
+        drawn = sample(WIDE, jax.random.key(1), (12_000,))
+        family, target = np.asarray(drawn.family), np.asarray(drawn.target)
+    assert target.shape == (12_000, 2)
+    boxes = [(i, box) for i, each in enumerate(WIDE) for box in each.targets]
+    for which, box in boxes:
+        assert_a_share_and_uniform(family, target, which, box, 3000)
+    of_one = target[(family == 0) & (target[:, 1] < 0)]
+    assert abs(np.corrcoef(of_one.T)[0, 1]) < 0.08  # one number says nothing of the other
+
+
+def test_one_task_from_numpy_is_a_task():
+    task = draw(WIDE, np.random.default_rng(3))
+    assert (task.family.shape, task.target.shape) == ((), (2,))
+    again = draw(WIDE, np.random.default_rng(3))
+    np.testing.assert_array_equal(task.target, again.target)
 
 
 EPISODES, DECISIONS = 2000, 12
@@ -39,20 +75,27 @@ EPISODES, DECISIONS = 2000, 12
 @pytest.fixture(scope="module")
 def switching():
     """Tasks [episode, decision] of which a quarter change."""
-    return TASKS.sample_episodes(jax.random.key(1), EPISODES, DECISIONS, 0.25)
+    return sample_episodes(FAMILIES, jax.random.key(1), EPISODES, DECISIONS, 0.25)
 
 
 def changes(tasks):
     """Whether the task of a decision is another one than that before."""
-    return np.diff(np.asarray(tasks.target), axis=1) != 0
+    return (np.diff(np.asarray(tasks.target), axis=1) != 0).any(axis=-1)
 
 
 def test_a_task_changes_once_at_most(switching):
-    assert switching.family.shape == switching.target.shape == (EPISODES, DECISIONS)
+    assert switching.family.shape == (EPISODES, DECISIONS)
+    assert switching.target.shape == (EPISODES, DECISIONS, 1)
     times = changes(switching).sum(axis=1)
     assert set(times) == {0, 1}
     assert times.mean() == pytest.approx(0.25, abs=0.04)  # 4 standard deviations
     assert (changes(switching) | (np.diff(switching.family, axis=1) == 0)).all()  # families with their targets
+
+
+def test_all_numbers_of_a_target_change_at_once():
+    both = np.diff(np.asarray(sample_episodes(WIDE, jax.random.key(2), 200, 8, 1.0).target), axis=1) != 0
+    assert (both.any(axis=-1).sum(axis=1) == 1).all()
+    assert both.all(axis=-1).sum() > 50  # from one place to another
 
 
 def test_a_task_changes_at_any_decision_but_the_first(switching):
@@ -62,24 +105,20 @@ def test_a_task_changes_at_any_decision_but_the_first(switching):
 
 def test_tasks_before_and_after_a_change_are_drawn_alike(switching):
     changed = changes(switching).any(axis=1)
+    targets = np.asarray(switching.target)[..., 0]
     for decision in (0, -1):
-        family, target = (np.asarray(part)[changed, decision] for part in (switching.family, switching.target))
-        assert (family == VELOCITY).mean() == pytest.approx(1 / 3, abs=0.09)
-        inside = np.where(family == VELOCITY, (target >= 1) & (target <= 3), (abs(target) >= 2) & (abs(target) <= 15))
-        assert inside.all()
-    first, last = np.asarray(switching.target)[changed][:, [0, -1]].T
+        family, target = np.asarray(switching.family)[changed, decision], targets[changed, decision]
+        is_speed = family == OF_VELOCITY
+        assert is_speed.mean() == pytest.approx(1 / 3, abs=0.09)
+        assert np.where(is_speed, (target >= 1) & (target <= 3), (abs(target) >= 2) & (abs(target) <= 15)).all()
+    first, last = targets[changed][:, [0, -1]].T
     assert abs(np.corrcoef(first, last)[0, 1]) < 0.2
 
 
 @pytest.mark.parametrize(("share", "changing"), [(0.0, 0), (1.0, 50)])
 def test_no_task_changes_or_every_one(share, changing):
-    assert changes(TASKS.sample_episodes(jax.random.key(0), 50, 8, share)).sum() == changing
+    assert changes(sample_episodes(FAMILIES, jax.random.key(0), 50, 8, share)).sum() == changing
 
 
 def test_an_episode_of_one_decision_has_one_task():
-    assert TASKS.sample_episodes(jax.random.key(0), 5, 1, 1.0).target.shape == (5, 1)
-
-
-def test_unknown_family():
-    with pytest.raises(RebodyError, match="Families are: goal"):
-        TaskDistribution((BaseTask("fly", 0.0, 1.0),)).sample(jax.random.key(0), ())
+    assert sample_episodes(FAMILIES, jax.random.key(0), 5, 1, 1.0).target.shape == (5, 1, 1)

@@ -4,12 +4,14 @@ import json
 
 import numpy as np
 import pytest
+from tests.tasks.conftest import PLACE
 
 from rebody.errors import RebodyError
-from rebody.tasks import GOAL, VELOCITY
+from rebody.tasks import SHIPPED, FamilySet
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks, parse_task, read_tasks
 
 GOOD = {"family": "goal", "target": -9.0}
+FAMILIES = SHIPPED.only(("goal", "velocity")).beside(FamilySet((PLACE,)))
 
 
 @pytest.fixture
@@ -26,11 +28,11 @@ def file_of(tmp_path):
 
 def test_a_good_file(file_of):
     switched = {"family": "velocity", "target": 1, "switch": {"at_s": 8, "family": "goal", "target": 4.5}}
-    first, second = read_tasks(file_of([GOOD, switched]))
-    assert first == TaskSpec("goal", -9.0)
+    first, second = read_tasks(file_of([GOOD, switched]), FAMILIES)
+    assert first == TaskSpec("goal", (-9.0,))
     assert first.last == first
-    assert second == TaskSpec("velocity", 1.0, Switch(8.0, "goal", 4.5))
-    assert second.last == TaskSpec("goal", 4.5)
+    assert second == TaskSpec("velocity", (1.0,), Switch(8.0, "goal", (4.5,)))
+    assert second.last == TaskSpec("goal", (4.5,))
 
 
 def switch(**changes):
@@ -42,35 +44,40 @@ def without(entry, key):
 
 
 MALFORMED = [
-    (3, "expected an object.*got 3"),
-    (["goal", 3], "expected an object"),
-    (None, "expected an object.*got null"),
-    (without(GOOD, "family"), "'family' is missing"),
-    (without(GOOD, "target"), "'target' is missing"),
-    (GOOD | {"targt": 1}, "unknown key 'targt'; known are family, switch, target"),
-    (GOOD | {"family": "gaol"}, "unknown task family 'gaol'. Did you mean 'goal'"),
-    (GOOD | {"family": 2}, "the family must be a name, got 2"),
-    (GOOD | {"target": "far"}, "the target is 'far'; give a number"),
-    (GOOD | {"target": True}, "the target is True; give a number"),
-    (GOOD | {"target": None}, "the target is None; give a number"),
-    (GOOD | {"target": float("nan")}, "the target is nan; give a finite number"),
-    (GOOD | {"target": float("inf")}, "the target is inf; give a finite number"),
-    (GOOD | {"target": 10**400}, r"the target is 10+\.\.\.; give a number"),
-    (GOOD | {"target": -1e39}, r"the target is -1e\+39; give a number of at most 1e\+06"),
-    (GOOD | {"switch": 3}, "switch: expected an object"),
-    (GOOD | {"switch": GOOD}, "switch: 'at_s' is missing"),
-    (switch(when=1), "switch: unknown key 'when'; known are at_s, family, target"),
-    (switch(family="fly"), "switch: unknown task family 'fly'"),
-    (switch(target=[]), "switch: the target has shape"),
-    (switch(at_s="soon"), "switch: 'at_s' is 'soon'; give a number"),
-    (switch(at_s=-1.0), "the switch cannot be before the start"),
+    (3, "Expected `object`, got `int`"),
+    (["goal", 3], "Expected `object`, got `array`"),
+    (None, "Expected `object`, got `null`"),
+    (without(GOOD, "family"), "missing required field `family`"),
+    (without(GOOD, "target"), "missing required field `target`"),
+    (GOOD | {"targt": 1}, "targt: it is unknown"),
+    (GOOD | {"family": "gaol"}, "unknown family 'gaol'. Did you mean 'goal'"),
+    (GOOD | {"family": 2}, "family: Expected `str`, got `int`"),
+    (GOOD | {"target": "far"}, "target: Expected `array`, got `str`"),
+    (GOOD | {"target": True}, "target: Expected `array`, got `bool`"),
+    (GOOD | {"target": None}, "target: Expected `array`, got `null`"),
+    (GOOD | {"target": float("nan")}, r"target\[0\]: Expected `float`"),
+    (GOOD | {"target": float("inf")}, r"target\[0\]: Expected `float` <= 1000000"),
+    (GOOD | {"target": 10**400}, r"target\[0\]: "),
+    (GOOD | {"target": -1e39}, r"target\[0\]: Expected `float` >= -1000000"),
+    (GOOD | {"target": []}, r"a target of 'goal' has 1 numbers \(x\), not 0"),
+    (GOOD | {"target": [1.0, 2.0]}, r"a target of 'goal' has 1 numbers \(x\), not 2"),
+    (GOOD | {"family": "place"}, r"a target of 'place' has 2 numbers \(x, y\), not 1"),
+    (GOOD | {"family": "place", "target": [1.0, "far"]}, r"target\[1\]: Expected `float`, got `str`"),
+    (GOOD | {"family": "place", "target": [1.0, float("nan")]}, r"target\[1\]: Expected `float`"),
+    (GOOD | {"switch": 3}, "switch: Expected `object"),
+    (GOOD | {"switch": GOOD}, "switch: .*missing required field `at_s`"),
+    (switch(when=1), "switch.when: it is unknown"),
+    (switch(family="fly"), "unknown family 'fly'"),
+    (switch(target=[]), "a target of 'goal' has 1 numbers"),
+    (switch(at_s="soon"), "switch.at_s: Expected `float`, got `str`"),
+    (switch(at_s=-1.0), "switch.at_s: Expected `float` >= 0"),
 ]
 
 
 @pytest.mark.parametrize(("entry", "said"), MALFORMED)
 def test_a_malformed_entry_is_named(file_of, entry, said):
     with pytest.raises(RebodyError, match=rf"tasks\.json, task 1.*{said}"):
-        read_tasks(file_of([GOOD, entry]))
+        read_tasks(file_of([GOOD, entry]), FAMILIES)
 
 
 @pytest.mark.parametrize(
@@ -82,26 +89,27 @@ def test_a_malformed_entry_is_named(file_of, entry, said):
         ("9" * 10_000, "is not a JSON file"),
         ([], "at least one task"),
         (GOOD, "must hold a list"),
+        ([GOOD] * 20_001, "20,001 tasks; at most 20,000"),
     ],
 )
 def test_a_file_that_is_no_list_of_tasks(file_of, content, said):
     with pytest.raises(RebodyError, match=said):
-        read_tasks(file_of(content))
+        read_tasks(file_of(content), FAMILIES)
 
 
 def test_a_file_that_cannot_be_read(tmp_path):
     with pytest.raises(RebodyError, match="there is no task file"):
-        read_tasks(tmp_path / "none.json")
+        read_tasks(tmp_path / "none.json", FAMILIES)
     with pytest.raises(RebodyError, match="is a folder"):
-        read_tasks(tmp_path)
+        read_tasks(tmp_path, FAMILIES)
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(RebodyError, match="is not a JSON file"):
-        read_tasks(tmp_path / "bytes")
+        read_tasks(tmp_path / "bytes", FAMILIES)
 
 
 def test_parse_task():
-    assert parse_task("goal=-9") == TaskSpec("goal", -9.0)
-    assert parse_task("velocity=1.5") == TaskSpec("velocity", 1.5)
+    assert parse_task("goal=-9", FAMILIES) == TaskSpec("goal", (-9.0,))
+    assert parse_task("velocity=1.5", FAMILIES) == TaskSpec("velocity", (1.5,))
 
 
 @pytest.mark.parametrize(
@@ -113,18 +121,35 @@ def test_parse_task():
         ("goal=nan", "the target is nan; give a finite number"),
         ("goal=1_0", "write FAMILY=TARGET"),
         ("gaol=3", "Did you mean 'goal'"),
-        ("=3", "unknown task family"),
+        ("=3", "unknown family"),
+        ("place=3", r"has 2 numbers \(x, y\), not 1"),
+        ("goal=3,4", "has 1 numbers"),
     ],
 )
 def test_parse_task_refuses(text, said):
     with pytest.raises(RebodyError, match=f"'{text}'.*{said}"):
-        parse_task(text)
+        parse_task(text, FAMILIES)
+
+
+def test_vectors_are_lists_in_a_file_and_comma_separated_on_the_command_line(file_of):
+    """And what is written of them reads as it was."""
+    place = {"family": "place", "target": [3, -2.5], "switch": {"at_s": 1, "family": "goal", "target": [4.0]}}
+    (spec,) = read_tasks(file_of([place]), FAMILIES)
+    assert spec == TaskSpec("place", (3.0, -2.5), Switch(1.0, "goal", (4.0,)))
+    assert read_tasks(file_of([spec.to_json()]), FAMILIES) == [spec]
+    assert spec.to_json()["switch"]["target"] == 4.0
+    assert spec.families == ("place", "goal")
+    assert parse_task("place=3,-2.5", FAMILIES) == TaskSpec("place", (3.0, -2.5))
 
 
 def test_active_tasks_change_at_the_switch():
-    specs = [TaskSpec("goal", 2.0), TaskSpec("velocity", 1.0, Switch(0.3, "goal", -4.0))]
-    tasks = active_tasks(specs, 5, 0.1)
-    np.testing.assert_array_equal(tasks.family[:, 0], [GOAL] * 5)
-    np.testing.assert_array_equal(tasks.target[:, 0], [2.0] * 5)
-    np.testing.assert_array_equal(tasks.family[:, 1], [VELOCITY] * 3 + [GOAL] * 2)
-    np.testing.assert_array_equal(tasks.target[:, 1], [1.0] * 3 + [-4.0] * 2)
+    specs = [
+        TaskSpec("goal", (2.0,)),
+        TaskSpec("velocity", (1.0,), Switch(0.3, "goal", (-4.0,))),
+        TaskSpec("goal", (1.0,), Switch(0.2, "place", (3.0, -2.0))),
+    ]
+    tasks = active_tasks(specs, FAMILIES, 5, 0.1)
+    np.testing.assert_array_equal(tasks.family.T, [[0] * 5, [1] * 3 + [0] * 2, [0] * 2 + [2] * 3])
+    np.testing.assert_array_equal(tasks.target[:, 0], [[2.0, 0.0]] * 5)
+    np.testing.assert_array_equal(tasks.target[:, 1], [[1.0, 0.0]] * 3 + [[-4.0, 0.0]] * 2)
+    np.testing.assert_array_equal(tasks.target[:, 2], [[1.0, 0.0]] * 2 + [[3.0, -2.0]] * 3)

@@ -37,7 +37,7 @@ def turns(cheetah, inference, config):
     known, rewards = [], []
     for i in range(TURNS):
         world, metrics = learner.collect(state, batch, np.random.default_rng(i), jax.random.key(i))
-        known.append(world.inference)
+        known.append(world)
         rewards.append(metrics["task_reward"])
         state = replace(state, world=world, iteration=np.asarray(i + 1))
     return state.replay.rows, known, rewards
@@ -50,7 +50,7 @@ def by_step(rows):
 
 def targets(known):
     """The hidden goal at each control step; episodes begin at control steps 0, 10 and 20."""
-    of_episode = [np.asarray(known[i].task.target) for i in (1, 4, 5)]
+    of_episode = [np.asarray(known[i].task.target)[:, 0] for i in (1, 4, 5)]
     return np.repeat(of_episode, [EPISODE, EPISODE, TURNS * STEPS - 2 * EPISODE], axis=0)
 
 

@@ -12,7 +12,6 @@ from rebody.bodies import RobotBatch
 from rebody.control.sac import SACConfig
 from rebody.control.slot_policy import subgoal_of
 from rebody.store import tree_hash
-from rebody.tasks import GOAL
 from rebody.training.high_level import HighLevelConfig, HighLevelLearner, shaped
 from rebody.training.motion import decision
 from rebody.training.off_policy import initial_state
@@ -73,7 +72,7 @@ def test_it_is_paid_by_the_task_alone(turns, config, inference):
     """With a pull on arrival that is a function of the reward."""
     replay, known, metrics = turns
     x = 10.0 * replay.next_observation[..., 0]  # the tiny module's policy sees x / 10 and vx / 3.5
-    target = np.stack([np.asarray(known[i].task.target) for i in (0, 2)]).repeat(DECISIONS, axis=0)
+    target = np.stack([np.asarray(known[i].task.target)[:, 0] for i in (0, 2)]).repeat(DECISIONS, axis=0)
     earned = -np.abs(x - target)
     scaled = earned / inference.parts.module.encoder.reward_scale
     np.testing.assert_allclose(replay.reward, shaped(scaled, np.zeros(scaled.shape, bool), config), atol=1e-4)
@@ -99,11 +98,11 @@ def test_a_subgoal_is_held_for_a_decision(begun, learner):
     """As long as the tracker alone would need for two control steps."""
     batch, _ = begun()
     twin, _ = begun()
-    subgoal = Subgoal(np.full(ROBOTS, GOAL, np.int32), np.array([3.0, -3.0, 0.0], np.float32))
+    subgoal = Subgoal(np.zeros(ROBOTS, np.int32), np.array([[3.0], [-3.0], [0.0]], np.float32))
     _, fell = decision(batch, lambda _: follow(learner.controller, batch, subgoal))
     for _ in range(2):
-        joints, pitch = twin.proprioception(), twin.spec.pitch(twin.qpos).astype(np.float32)
-        twin.step(np.asarray(learner.controller(joints, twin.x.astype(np.float32), pitch, subgoal, None)))
+        joints, pose = twin.proprioception(), twin.pose().astype(np.float32)
+        twin.step(np.asarray(learner.controller(joints, pose, subgoal, None)))
     np.testing.assert_allclose(batch.qpos, twin.qpos, atol=1e-4)
     assert not fell.any()
 
@@ -114,9 +113,8 @@ def test_a_policy_sees_what_the_toys_policy_sees(begun, inference, learner):
     view, interpret = inference.parts.high_level.view, inference.parts.module.decoder.interpret
     np.testing.assert_allclose(learner.observe(known), view(known.state, interpret(known.belief)), atol=1e-6)
     pooled = np.array([[0.5], [-0.5], [0.1]], np.float32)
-    np.testing.assert_allclose(
-        subgoal_of(pooled, known.state, learner.slots).value, batch.x + 5 * (pooled * np.abs(pooled))[:, 0], rtol=1e-4
-    )
+    asked = subgoal_of(pooled, known.state, learner.slots).value
+    np.testing.assert_allclose(asked, batch.x[:, None] + 5 * pooled * np.abs(pooled), rtol=1e-4)
 
 
 def test_nothing_that_is_frozen_changes(begun, inference, tracker, learner):

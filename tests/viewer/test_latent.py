@@ -6,6 +6,7 @@ import pytest
 from rebody.agents.belief import Reading
 from rebody.inference.mixture.estimator import DirichletProcessMixture
 from rebody.inference.mixture.padded import mixture_prior
+from rebody.tasks import SHIPPED
 from rebody.types import Belief
 from rebody.viewer.latent import LatentPicture, component, plane_of
 
@@ -25,7 +26,7 @@ def active(mixture) -> list[int]:
 
 def reading(mean: list[float], responsibilities: dict[int, float], family: str = "goal") -> Reading:
     latent = Belief(np.array(mean), np.full(len(mean), 0.04))
-    return Reading(family, 1.0, {("goal", 1): 1.0, ("goal", -1): 0.0}, responsibilities, latent)
+    return Reading(family, (1.0,), {("goal", "front"): 1.0, ("goal", "back"): 0.0}, responsibilities, latent)
 
 
 def test_a_component_is_where_its_points_are(mixture):
@@ -50,7 +51,7 @@ def test_without_clusters_the_first_two_numbers_are_seen():
 
 
 def test_the_picture_shows_the_belief_and_whose_it_is(mixture):
-    picture = LatentPicture(4, mixture)
+    picture = LatentPicture(4, mixture, SHIPPED)
     first, second = active(mixture)[:2]
     shares = {k: float(k == first) for k in active(mixture)}
     others = {k: float(k == second) for k in shares}
@@ -64,7 +65,7 @@ def test_the_picture_shows_the_belief_and_whose_it_is(mixture):
 
 
 def test_a_belief_far_away_gets_room():
-    picture = LatentPicture(2, None)
+    picture = LatentPicture(2, None, SHIPPED)
     far = picture.draw([reading([50.0, 3.0], {}, family="velocity")])
     green = (np.abs(far.astype(int) - [0x3F, 0x8F, 0x63]) < 10).all(axis=-1)
     assert green.sum() > 20

@@ -87,7 +87,7 @@ def brown_pixels(tab) -> int:
 
 def test_in_a_browser_the_belief_follows_a_change_of_the_task(browser):
     errors: list[str] = []
-    with shown(TaskSpec("goal", 2.0)) as (page, address):
+    with shown(TaskSpec("goal", (2.0,))) as (page, address):
         tab = open_tab(browser, address, errors)
         tab.get_by_text("What it believes").wait_for()
         tab.get_by_text("x real time").wait_for()
@@ -101,7 +101,7 @@ def test_in_a_browser_the_belief_follows_a_change_of_the_task(browser):
         tab.get_by_text("Change the task now").click()
         tab.get_by_role("row", name="hidden task velocity +1.50 m/s").wait_for()
         wait_for(lambda: page.session.moments[-1].reading.family == "velocity", "the belief")
-        wait_for(lambda: abs(page.session.moments[-1].reading.target - 1.5) < 0.2, "the believed speed")
+        wait_for(lambda: abs(page.session.moments[-1].reading.target[0] - 1.5) < 0.2, "the believed speed")
         tab.get_by_role("row", name="believed velocity +1.").wait_for()
 
         # a closed tab stops the time, a new one finds all as it was
@@ -133,19 +133,19 @@ class Onlooker:
 
 
 def test_orders_are_carried_out(looked_at):
-    with shown(TaskSpec("goal", 2.0)) as (page, _):
+    with shown(TaskSpec("goal", (2.0,))) as (page, _):
         orders = page.controls.orders
         wait_for(lambda: hasattr(page, "session") and page.session.time_s > 0.3, "the start")
-        orders.put(TaskSpec("velocity", -1.0))
-        wait_for(lambda: page.session.task == TaskSpec("velocity", -1.0), "the task")
+        orders.put(TaskSpec("velocity", (-1.0,)))
+        wait_for(lambda: page.session.task == TaskSpec("velocity", (-1.0,)), "the task")
 
         cheetah = page.session
         orders.put(Choice("point-mass", "goal-velocity-stand", "oracle"))
         wait_for(lambda: page.session is not cheetah, "another session")
         assert page.session.trial.robot is None
-        assert page.session.task == TaskSpec("velocity", -1.0)
+        assert page.session.task == TaskSpec("velocity", (-1.0,))
 
-        orders.put(TaskSpec("goal", 0.0))
+        orders.put(TaskSpec("goal", (0.0,)))
         orders.put(Restart())
         wait_for(lambda: page.session.task.family == "goal", "the task")
         before = page.session.x
@@ -154,7 +154,7 @@ def test_orders_are_carried_out(looked_at):
 
 
 def test_what_does_not_fit_is_said_and_all_goes_on(looked_at):
-    with shown(TaskSpec("goal", 2.0)) as (page, _):
+    with shown(TaskSpec("goal", (2.0,))) as (page, _):
         wait_for(lambda: hasattr(page, "session"), "the start")
         session = page.session
         page.controls.orders.put(Choice("walker", "goal-velocity-stand", "idle"))

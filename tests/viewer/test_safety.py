@@ -20,7 +20,7 @@ from rebody.viewer.controls import SPEEDS, Choice, Offered  # noqa: E402
 from rebody.viewer.page import Page  # noqa: E402
 from rebody.viewer.server import serving  # noqa: E402
 
-FIRST, TASK = Choice("point-mass", "tiny", "reuse"), TaskSpec("goal", 2.0)
+FIRST, TASK = Choice("point-mass", "tiny", "reuse"), TaskSpec("goal", (2.0,))
 OFFERED = Offered(["point-mass"], ["tiny"])
 MESSAGES = 1000
 PATIENCE_S = 60.0
@@ -72,7 +72,7 @@ def test_the_page_survives_a_thousand_random_messages_and_obeys(visit, toy_trial
             for label, value in {"Kind": "goal", "Target": 1.0, "Change the task now": True}.items():
                 browser.change(widgets[label], value)
             time.sleep(0.1)
-            return page.session.task == TaskSpec("goal", 1.0)
+            return page.session.task == TaskSpec("goal", (1.0,))
 
         wait_for(obeys, "a good order")
         if page.controls.paused:
@@ -148,18 +148,18 @@ def test_sliders_take_numbers_in_their_range(visit, toy_trial, heard):
 
         browser.change(widgets["Target"], 500.0)
         browser.change(widgets["Change the task now"], True)
-        wait_for(lambda: page.session.task.target == 10.0, "the farthest goal")
+        wait_for(lambda: page.session.task.target == (10.0,), "the farthest goal")
         browser.change(widgets["Target"], "nan")
         browser.change(widgets["Change the task now"], True)
         wait_for(lambda: bool(heard), "a complaint")
         assert "the target is nan" in heard[0]
-        assert page.session.task.target == 10.0
-        wait_for(lambda: page.controls._target.value == 10.0, "the target to be put back")
+        assert page.session.task.target == (10.0,)
+        wait_for(lambda: page.controls._targets[0].value == 10.0, "the target to be put back")
 
 
 def test_a_target_that_is_no_number_leaves_the_task_as_it_was(toy_trial, heard):
     with shown(lambda _: toy_trial) as (page, _):
-        page.controls.orders.put(TaskSpec("goal", math.nan))
+        page.controls.orders.put(TaskSpec("goal", (math.nan,)))
         wait_for(lambda: bool(heard), "a complaint")
         assert page.session.task == TASK
 

@@ -7,12 +7,13 @@ import pytest
 
 from rebody.errors import RebodyError
 from rebody.evaluation.evaluate import run_trial, trial_agent
-from rebody.inference.contract import Contract
+from rebody.ranges import Box, interval
+from rebody.tasks import SHIPPED, Family, FamilySet, Quantity
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 from rebody.types import DECISION_DT
 from rebody.viewer.session import Session, fitting, target_range
 
-TASK, OTHER = TaskSpec("goal", 3.0), TaskSpec("goal", -2.0)
+TASK, OTHER = TaskSpec("goal", (3.0,)), TaskSpec("goal", (-2.0,))
 DECISIONS, CHANGE = 12, 5
 
 
@@ -45,11 +46,11 @@ def test_a_session_is_an_episode_whose_task_changes(fresh):
     fresh.set_task(OTHER)
     decide(fresh, DECISIONS - CHANGE)
     spec = replace(TASK, switch=Switch(CHANGE * DECISION_DT, OTHER.family, OTHER.target))
-    tasks = active_tasks([spec], DECISIONS, DECISION_DT)
+    tasks = active_tasks([spec], fresh.trial.in_play, DECISIONS, DECISION_DT)
     episode = run_trial(fresh.trial, trial_agent(fresh.trial, tasks), tasks, np.array([0]))
     moments = fresh.moments
     np.testing.assert_allclose([m.time_s for m in moments], DECISION_DT * np.arange(1, DECISIONS + 1))
-    np.testing.assert_allclose([m.reached["goal"] for m in moments], episode.state.x[:, 0], atol=1e-5)
+    np.testing.assert_allclose([m.reached["goal"] for m in moments], episode.state.x, atol=1e-5)
     np.testing.assert_allclose([m.reward for m in moments], episode.reward[:, 0], atol=1e-5)
     np.testing.assert_allclose([m.reading.latent.mean for m in moments], episode.belief.mean[:, 0], atol=1e-5)
     assert [m.task for m in moments] == [TASK] * CHANGE + [OTHER] * (DECISIONS - CHANGE)
@@ -106,16 +107,23 @@ def test_a_restart_forgets_all_but_the_task(fresh):
 def test_a_task_that_the_module_does_not_know_is_refused_and_the_old_one_stays(session):
     session.set_task(TASK)
     with pytest.raises(RebodyError, match="cannot infer 'velocity'"):
-        session.set_task(TaskSpec("velocity", 1.0))
+        session.set_task(TaskSpec("velocity", (1.0,)))
     assert session.task == TASK
 
 
 def test_targets_end_where_the_module_or_the_robot_ends(trial):
-    ranges = {"goal": (-10.0, 10.0), "velocity": (-4.0, 2.0)}
-    contract = Contract(("x",), 6, ranges, "plain")
+    lean = Family("lean", Quantity("lean", ("x", "pitch"), "m, rad", "lean"), (Box((-4.0, 0.0), (4.0, 1.0)),), 0.5, 0.3)
+    goal, velocity = (SHIPPED.named(name) for name in ("goal", "velocity"))
+    families = FamilySet((goal.within(interval(-10.0, 10.0)), velocity.within(interval(-4.0, 2.0)), lean))
+    contract = replace(trial.inference.contract, families=families)
     trial = replace(trial, inference=replace(trial.inference, contract=contract))
-    assert target_range(trial, "goal") == (-10.0, 10.0)
-    assert target_range(trial, "velocity") == (-3.0, 2.0)  # the tracker's reach is +-3 m/s
-    assert fitting(trial, TaskSpec("velocity", -3.7)) == TaskSpec("velocity", -3.0)
-    assert fitting(trial, TaskSpec("goal", 4.0)) == TaskSpec("goal", 4.0)
-    assert fitting(trial, TaskSpec("stand", 1.0)) == TaskSpec("goal", 5.0)
+    assert target_range(trial, "goal") == interval(-10.0, 10.0)
+    assert target_range(trial, "velocity") == interval(-3.0, 2.0)  # the tracker's reach is +-3 m/s
+    assert target_range(trial, "lean") == lean.range
+    for task, fits in {
+        TaskSpec("velocity", (-3.7,)): TaskSpec("velocity", (-3.0,)),
+        TaskSpec("goal", (4.0,)): TaskSpec("goal", (4.0,)),
+        TaskSpec("stand", (1.0,)): TaskSpec("goal", (5.0,)),
+        TaskSpec("lean", (-5.0, 0.5)): TaskSpec("lean", (-4.0, 0.5)),
+    }.items():
+        assert fitting(trial, task) == fits

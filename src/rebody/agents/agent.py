@@ -11,9 +11,10 @@ from jaxtyping import Float, Int
 
 from rebody.agents.slots import SlotChooser
 from rebody.bodies.toys import Toy
-from rebody.control.high_level import HighLevelPolicy, TaskCode
+from rebody.control.high_level import HighLevelPolicy
+from rebody.control.places import TaskCode
 from rebody.control.slot_policy import SlotPolicy
-from rebody.tasks import GOAL, VELOCITY, achieved_by_way_of
+from rebody.tasks import FamilySet
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task, Transition
 
 
@@ -48,7 +49,7 @@ class Inferrer(Protocol):
         ...
 
 
-Reader = Callable[[Belief], tuple[Int[AnyArray, "*batch"], Float[AnyArray, "*batch"]]]
+Reader = Callable[[Belief], tuple[Int[AnyArray, "*batch"], Float[AnyArray, "*batch axis"]]]
 """Says which family and target a belief speaks of."""
 
 
@@ -67,6 +68,8 @@ class Agent(eqx.Module):
 
     inferrer: Inferrer
     reader: Reader
+    families: FamilySet = eqx.field(static=True)
+    """What its subgoals are about."""
     stride: int = eqx.field(static=True)
 
     def begin(self, state: GlobalState) -> tuple[Carry, Command]:
@@ -114,7 +117,7 @@ class ReuseAgent(Agent):
         """The policy's action for a toy; for a robot, where that policy would lead a toy from here."""
         action = self.high_level(state, self.interpret(belief))
         slot = self.slots(belief)
-        return Command(action, Subgoal(slot, achieved_by_way_of(slot, self.imagine(state, belief))))
+        return Command(action, Subgoal(slot, self.families.achieved_by_way_of(slot, self.imagine(state, belief))))
 
     def imagine(self, state: GlobalState, belief: Belief) -> GlobalState:
         """Where the nominal toy would be after each of `horizon` decisions, [decision, *batch], the belief held."""
@@ -174,8 +177,8 @@ class FlatAgent(Agent):
 
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """Nothing: the value is not a number."""
-        none = jnp.full(state.x.shape, jnp.nan)
-        return Command(none[..., None], Subgoal(jnp.full(state.x.shape, GOAL), none))
+        none = jnp.full((*state.x.shape, self.families.size), jnp.nan)
+        return Command(none[..., :1], Subgoal(jnp.zeros(state.x.shape, jnp.int32), none))
 
 
 class IdleAgent(Agent):
@@ -185,6 +188,11 @@ class IdleAgent(Agent):
     """Numbers in a toy's action."""
 
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
-        """A speed of zero."""
-        still = Subgoal(jnp.full(state.x.shape, VELOCITY), jnp.zeros_like(state.x))
-        return Command(jnp.zeros((*state.x.shape, self.actions)), still)
+        """No force; of a robot, a speed of zero where the families have a speed, else where it began."""
+        return Command(jnp.zeros((*state.x.shape, self.actions)), standing_still(self.families, state.x.shape))
+
+
+def standing_still(families: FamilySet, shape: tuple[int, ...]) -> Subgoal:
+    """A speed of zero; where there is no slot for speeds, the rest pose."""
+    speeds = [i for i, family in enumerate(families) if not family.is_pose and family.settle != "largest of 1 s"]
+    return Subgoal(jnp.full(shape, speeds[0] if speeds else 0, jnp.int32), jnp.zeros((*shape, families.size)))

@@ -8,7 +8,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
 
 from rebody import inputs
 from rebody.agents.doubts import RECENT_S, RewardWatch
@@ -19,8 +18,7 @@ from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import MixturePrior
 from rebody.inference.probe import Probe
 from rebody.jax_settings import own_jax_settings
-from rebody.tasks import FAMILIES
-from rebody.types import ANGLES, DECISION_DT, GLOBAL_FIELDS, RATE_OF, AnyArray, Belief, GlobalState, Transition
+from rebody.types import ANGLES, DECISION_DT, GLOBAL_FIELDS, RATE_OF, Belief, GlobalState, Transition
 
 
 @dataclass(frozen=True)
@@ -29,10 +27,10 @@ class Reading:
 
     family: str
     """The likeliest."""
-    target: float
-    """In the family's unit (m, m/s, rad)."""
-    base_tasks: dict[tuple[str, int], float]
-    """Probability of each base task that the module knows: a family, and 1 or -1 for its target's sign."""
+    target: tuple[float, ...]
+    """In the units of the family's quantity (m, m/s, rad)."""
+    base_tasks: dict[tuple[str, str], float]
+    """Probability of each base task that the module knows: a family and a direction, such as ("goal", "front")."""
     responsibilities: dict[int, float]
     """Of each of the mixture's clusters; empty where there is no mixture."""
     latent: Belief
@@ -41,8 +39,10 @@ class Reading:
     @property
     def probabilities(self) -> dict[str, float]:
         """Of each family."""
-        families = dict.fromkeys(family for family, _ in self.base_tasks)
-        return {family: sum(self.base_tasks[family, sign] for sign in (1, -1)) for family in families}
+        families = dict.fromkeys((family for family, _ in self.base_tasks), 0.0)
+        for (family, _), probability in self.base_tasks.items():
+            families[family] += probability
+        return families
 
 
 class LiveBelief:
@@ -101,16 +101,16 @@ class LiveBelief:
 
     def _read(self, belief: Belief) -> Reading:
         read = jax.tree.map(np.asarray, _read(self._probe, self._mixture, belief))
-        family, target, probabilities, front, shares = read
-        names = [FAMILIES[i].name for i in np.asarray(self._probe.families)]
+        which, target, probabilities, spreads, shares = read
+        families, family = self._probe.families, self._probe.families[which]
         clusters = [] if self._mixture is None else np.flatnonzero(self._mixture.active)
         return Reading(
-            family=FAMILIES[int(family)].name,
-            target=float(target),
+            family=family.name,
+            target=tuple(target[: family.size].tolist()),
             base_tasks={
-                (name, sign): float(share * (ahead if sign > 0 else 1 - ahead))
-                for name, share, ahead in zip(names, probabilities, front, strict=True)
-                for sign in (1, -1)
+                (each.name, direction): float(share * chance)
+                for each, share, spread in zip(families, probabilities, spreads, strict=True)
+                for direction, chance in zip(each.direction_names, each.direction_chances(*spread), strict=True)
             },
             responsibilities={int(k): float(shares[k]) for k in clusters},
             latent=jax.tree.map(np.asarray, belief),
@@ -156,8 +156,7 @@ def _take_in(encoder: Encoder, memory: EncoderCarry, transition: Transition) -> 
 
 
 @eqx.filter_jit
-def _read(
-    probe: Probe, mixture: MixturePrior | None, belief: Belief
-) -> tuple[Int[Array, ""], Float[Array, ""], Float[Array, " family"], Float[Array, " family"], Float[AnyArray, " K"]]:
+def _read(probe: Probe, mixture: MixturePrior | None, belief: Belief) -> tuple[Any, ...]:
+    """Family, target, probability of each family, mean and deviation of each one's target, of each cluster."""
     shares = jnp.zeros(0) if mixture is None else mixture.shares(belief.mean)
-    return *probe(belief), probe.probabilities(belief), probe.chances_of_front(belief), shares
+    return *probe(belief), probe.probabilities(belief), probe.spreads(belief), shares

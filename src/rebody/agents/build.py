@@ -18,10 +18,10 @@ from rebody.agents.parts import (
 from rebody.agents.slots import OneSlot, SlotChooser, SlotOfCluster
 from rebody.bodies import RobotSpec
 from rebody.control.slot_policy import SlotPolicy
-from rebody.control.step_predictor import SLOTS
+from rebody.control.step_predictor import is_predictable
 from rebody.errors import RebodyError, unknown
 from rebody.store import tree_hash
-from rebody.tasks import FAMILIES
+from rebody.tasks import FamilySet
 from rebody.types import Task
 
 HORIZON = 15
@@ -72,7 +72,7 @@ def check_step_predictor(part: LoadedStepPredictor, tracker: LoadedTracker, infe
     """RebodyError if a step predictor knows another tracker, or not all that the module's subgoals may be about."""
     check_tracker_of("step predictor", part, tracker)
     check_predictor(part, tracker)
-    without = [FAMILIES[family].name for family in inference.contract.families if family not in SLOTS]
+    without = [family.name for family in inference.contract.families if not is_predictable(family)]
     if without:
         raise RebodyError(
             f"step predictor '{part.name}' knows goals and speeds, and '{inference.name}' may ask for "
@@ -85,14 +85,13 @@ def slot_chooser(inference: Inference, loaded: LoadedSlots | None, by: SlotsBy) 
 
     RebodyError if the artifact is missing, was made for another module, or the module has no mixture to go by.
     """
-    families = inference.contract.families
     if loaded is None:
-        if len(families) != 1:
+        if len(inference.contract.families) != 1:
             raise RebodyError(
                 f"'{inference.name}' tells several families apart: `reuse` needs a classifier to choose the tracker's "
                 "slot (rebody train classifier)."
             )
-        return OneSlot(families[0])
+        return OneSlot()
     check_module_of("classifier", loaded, inference)
     check_slots(loaded, inference)
     if by == "classifier":
@@ -107,6 +106,7 @@ def build_agent(
     inference: Inference,
     tasks: Task | None = None,
     *,
+    families: FamilySet | None = None,
     slots: SlotChooser | None = None,
     high_level: SlotPolicy | None = None,
     scratch: ScratchParts | None = None,
@@ -115,9 +115,10 @@ def build_agent(
 ) -> Agent:
     """An agent of a named kind; `oracle` needs the tasks, the active ones [time, episode], `retrain` its policy,
     `scratch` its own module, and `reuse` on a robot what chooses its slots (a point mass has none: the module's first
-    family stands for all).
+    family stands for all). `families` are those in play, the module's first, which is all by default.
 
     RebodyError if there is no such kind, or the module cannot serve it.
     """
     check_agent(kind)
-    return KINDS[kind].build(Ingredients(inference, tasks, slots, high_level, scratch, stride, horizon))
+    in_play = families or inference.contract.families
+    return KINDS[kind].build(Ingredients(inference, in_play, tasks, slots, high_level, scratch, stride, horizon))

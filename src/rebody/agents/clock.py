@@ -10,9 +10,9 @@ from jaxtyping import Bool, Float, Int
 
 from rebody.agents.agent import Agent, Carry, Command, Observation
 from rebody.bodies import Simulation
+from rebody.control.command import addressed, relative
 from rebody.control.step_predictor import StepPredictor
-from rebody.control.tracker import relative
-from rebody.types import AnyArray, GlobalState, Subgoal
+from rebody.types import AnyArray, GlobalState, Pose, Subgoal
 
 
 class Clock(eqx.Module):
@@ -55,6 +55,8 @@ class PredictedClock(Clock):
     """Each decides when its subgoal should have been reached (thesis 6.4.3)."""
 
     predictor: StepPredictor
+    slots: tuple[int, ...] = eqx.field(static=True)
+    """Of each family in play, its slot in the tracker (`slots_among`)."""
 
     def begin(self, agent, state):
         """Carry and command have the episode first in every array, so that each can go its own pace."""
@@ -66,13 +68,8 @@ class PredictedClock(Clock):
 
     def steps(self, body, subgoal):
         """What the predictor says."""
-        return np.asarray(_predict(self.predictor, body.proprioception(), *place(body), subgoal))
-
-
-def place(body: Simulation) -> tuple[Float[np.ndarray, " robot"], Float[np.ndarray, " robot"]]:
-    """x [m] and pitch [rad] of each robot."""
-    x, _, _, _, pitch, _ = body.pose().T.astype(np.float32)
-    return x, pitch
+        asked, pose = addressed(subgoal, self.slots), body.pose().astype(np.float32)
+        return np.asarray(_predict(self.predictor, body.proprioception(), pose, asked))
 
 
 @eqx.filter_jit
@@ -114,8 +111,7 @@ def _decide_each(
 def _predict(
     predictor: StepPredictor,
     joints: Float[AnyArray, "episode joint"],
-    x: Float[AnyArray, " episode"],
-    pitch: Float[AnyArray, " episode"],
+    pose: Pose,
     subgoal: Subgoal,
 ) -> Int[AnyArray, " episode"]:
-    return predictor(joints, relative(subgoal, x, pitch))
+    return predictor(joints, relative(predictor.families, subgoal, pose))

@@ -4,32 +4,28 @@ Annotations set types and ranges; `__post_init__` says what they cannot, as a Va
 nothing is built from may be missing. `training` holds the settings of the run: it is read where that is wanted.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from msgspec import Meta
 
-from rebody.bodies.description import reach_problems
-from rebody.bodies.robot import Reach
 from rebody.bodies.toys import TOYS, Toy
-from rebody.control.high_level import Places, PolicyView
+from rebody.control.high_level import PolicyView
+from rebody.control.places import Places
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
 from rebody.inference.contract import CONTRACT_VERSION, Contract
 from rebody.inference.mixture.settings import MixtureConfig
 from rebody.ranges import Copies, Layers, Number, Positive
 from rebody.store.typed import Misfit, Typed, typed
-from rebody.tasks import FAMILIES
-from rebody.tasks.families import family_names
+from rebody.tasks import FamilySet
 from rebody.types import GLOBAL_FIELDS
 
 Name = Annotated[str, Meta(max_length=255, pattern=r"^[^\x00-\x1f\x7f]+$")]
 """Of a robot or an artifact: nothing that a terminal would obey."""
 Hash = Annotated[str, Meta(max_length=64)]
 """SHA-256 in hex, of the weights of another artifact."""
-FamilyIndex = Annotated[int, Meta(ge=0, lt=len(FAMILIES))]
-"""Into `rebody.tasks.FAMILIES`."""
 SMALLEST = 1e-6
 """What is divided by a smaller scale may overflow."""
 
@@ -93,7 +89,8 @@ class TrackerSettings:
     """Of a robot's tracker."""
 
     robot: Name
-    reach: Reach
+    families: FamilySet
+    """What it can be commanded to do, each with the range that it was trained for."""
     observations: Copies
     actions: Copies
     hidden: Layers
@@ -101,10 +98,6 @@ class TrackerSettings:
     control_dt: Positive | None = None
     """Simulated seconds of a control step, for the reader."""
     training: dict[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self):
-        """ValueError for a reach that cannot be."""
-        _check_reach(self.reach)
 
 
 @dataclass(frozen=True)
@@ -153,7 +146,7 @@ class HighLevelSettings:
     inference_hash: Hash
     tracker_hash: Hash
     view: PolicyView
-    slots: dict[str, Positive]
+    slots: Places
     """Of each family, what a value of 1 asks for [m ahead, m/s, rad]."""
     observations: Copies
     hidden: Layers
@@ -166,7 +159,9 @@ class HighLevelSettings:
         """ValueError for a view or slots that cannot be."""
         _check_fields("view.", self.view.fields, self.view.scales)
         _check_places("view.places", self.view.places)
-        _check_families("slots", self.slots)
+        if not self.slots:
+            raise ValueError("slots: there must be at least one")
+        _check_places("slots", self.slots)
 
 
 @dataclass(frozen=True)
@@ -175,16 +170,13 @@ class StepPredictorSettings:
 
     robot: Name
     tracker_hash: Hash
-    reach: Reach
+    families: FamilySet
+    """Of its tracker."""
     observations: Copies
     hidden: Layers
     projections: Number
     tracker: Name | None = None
     training: dict[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self):
-        """ValueError for a reach that cannot be."""
-        _check_reach(self.reach)
 
 
 @dataclass(frozen=True)
@@ -193,7 +185,8 @@ class ClassifierSettings:
 
     inference_hash: Hash
     latent: Copies
-    families: tuple[FamilyIndex, ...]
+    families: tuple[Name, ...]
+    """Of the module, in its order."""
     hidden: Layers
     components: Annotated[int, Meta(ge=0, le=4096)]
     """Of the module's mixture; 0 without one."""
@@ -215,13 +208,7 @@ def _check_module(contract: Contract, inference: InferenceConfig) -> None:
         raise ValueError(f"contract.fields: {', '.join(contract.fields)}, but the encoder sees {inference.fields}")
     if contract.window != inference.window:
         raise ValueError(f"contract.window: {contract.window}, but the encoder's is {inference.window}")
-    _check_families("contract.target_ranges", contract.target_ranges)
-    for family, (low, high) in contract.target_ranges.items():
-        if low > high or low == high == 0:
-            raise ValueError(f"contract.target_ranges.{family}: from {low} to {high} is no range of targets")
-    amounts = inference.latent - inference.kinds
-    if inference.kinds and (amounts < 1 or amounts % len(inference.fields)):
-        raise ValueError(f"inference.kinds: {inference.kinds} of a latent of {inference.latent} leave no fair shares")
+    inference.check(contract.families)
 
 
 def _check_fields(where: str, names: Sequence[str], scales: Sequence[float]) -> None:
@@ -232,9 +219,8 @@ def _check_fields(where: str, names: Sequence[str], scales: Sequence[float]) -> 
 
 
 def _check_places(key: str, places: Places) -> None:
-    if places:
-        _check_known(key, [name for name, _ in places], GLOBAL_FIELDS)
-        _check_divisors(key, [unit for _, unit in places])
+    for i, place in enumerate(places):
+        _check_fields(f"{key}[{i}].", place.quantity.components, place.scales)
 
 
 def _check_divisors(key: str, numbers: Sequence[float]) -> None:
@@ -242,17 +228,8 @@ def _check_divisors(key: str, numbers: Sequence[float]) -> None:
         raise ValueError(f"{key}: {min(numbers)} is too small to divide by")
 
 
-def _check_families(key: str, names: Iterable[str]) -> None:
-    _check_known(key, list(names), family_names())
-
-
 def _check_known(key: str, names: Sequence[str], known: Sequence[str]) -> None:
     if not names or len(set(names)) < len(names):
         raise ValueError(f"{key}: there must be at least one, and none twice")
     if unknown := [name for name in names if name not in known]:
         raise ValueError(f"{key}: {unknown[0]!r:.50} is unknown; there are {', '.join(known)}")
-
-
-def _check_reach(reach: Reach) -> None:
-    if problems := reach_problems(reach):
-        raise ValueError(f"reach: {'; '.join(problems)}")

@@ -9,15 +9,17 @@ import numpy as np
 from jaxtyping import Float
 
 from rebody.bodies import Simulation
+from rebody.control.command import Command, addressed, relative, slots_among
 from rebody.control.flat import FlatPolicy
-from rebody.control.tracker import Command, Tracker, relative
+from rebody.control.tracker import Tracker
 from rebody.inference.decoder import Decoder
-from rebody.tasks import GOAL
-from rebody.types import AnyArray, Belief, Subgoal
+from rebody.tasks import FamilySet
+from rebody.tasks.quantities import length
+from rebody.types import AnyArray, Belief, Pose, Subgoal
 
 
 class Controller(eqx.Module):
-    """(what it sees of the body, x, pitch, subgoal, belief) -> joint action; each kind looks at what it needs."""
+    """(what it sees of the body, pose, subgoal, belief) -> joint action; each kind looks at what it needs."""
 
     @abstractmethod
     def see(self, body: Simulation) -> Float[np.ndarray, "robot joint"]:
@@ -25,12 +27,7 @@ class Controller(eqx.Module):
 
     @abstractmethod
     def __call__(
-        self,
-        joints: Float[AnyArray, "*batch joint"],
-        x: Float[AnyArray, "*batch"],
-        pitch: Float[AnyArray, "*batch"],
-        subgoal: Subgoal,
-        belief: Belief | None,
+        self, joints: Float[AnyArray, "*batch joint"], pose: Pose, subgoal: Subgoal, belief: Belief | None
     ) -> Float[AnyArray, "*batch action"]:
         """Joint action in [-1, 1]."""
 
@@ -39,18 +36,31 @@ class TrackerController(Controller):
     """Follows the subgoal."""
 
     tracker: Tracker
-    goal_ahead: float = eqx.field(static=True, default=math.inf)
-    """Farthest that a goal is shown ahead [m], see `RobotSpec.goal_ahead`."""
+    slots: tuple[int, ...] = eqx.field(static=True)
+    """Of each family in play, its slot in the tracker; -1 for none."""
+    goal_ahead: float = eqx.field(static=True)
+    """Farthest that a place is shown ahead [m], see `RobotSpec.goal_ahead`."""
+
+    def __init__(self, tracker: Tracker, families: FamilySet | None = None, goal_ahead: float = math.inf):
+        """Subgoals are about `families`; by default the tracker's own."""
+        self.tracker, self.goal_ahead = tracker, goal_ahead
+        self.slots = slots_among(families or tracker.families, tracker.families)
 
     def see(self, body):
-        """The joint state, and the pace where there is one."""
+        """The joint state, and the filtered speed where there is one."""
         return body.proprioception()
 
-    def __call__(self, joints, x, pitch, subgoal, belief):
-        """A goal is made relative to where the robot is now."""
-        command = relative(subgoal, x, pitch)
-        near = jnp.clip(command.value, -self.goal_ahead, self.goal_ahead)
-        return self.tracker(joints, Command(command.slot, jnp.where(command.slot == GOAL, near, command.value)))
+    def __call__(self, joints, pose, subgoal, belief):
+        """A place is made relative to where the robot is now."""
+        families = self.tracker.families
+        command = relative(families, addressed(subgoal, self.slots), pose)
+        if math.isinf(self.goal_ahead):
+            return self.tracker(joints, command)
+        is_place = jnp.asarray([each.is_pose and not any(each.quantity.wraps) for each in families])[command.slot]
+        distance = length(command.value)
+        is_far = (is_place & (distance > self.goal_ahead))[..., None]
+        nearer = command.value / distance[..., None] * self.goal_ahead  # an exact sign where there is one axis
+        return self.tracker(joints, Command(command.slot, jnp.where(is_far, nearer, command.value)))
 
 
 class FlatController(Controller):
@@ -63,7 +73,7 @@ class FlatController(Controller):
         """The joint state."""
         return body.joint_state()
 
-    def __call__(self, joints, x, pitch, subgoal, belief):
+    def __call__(self, joints, pose, subgoal, belief):
         """There is no subgoal."""
         assert belief is not None
-        return self.policy(joints, x, self.decoder.interpret(belief))
+        return self.policy(joints, pose, self.decoder.interpret(belief))

@@ -4,10 +4,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from rebody.inference.contract import Contract
-from rebody.tasks import FAMILIES
-from rebody.tasks.bounds import ANY, payable
+from rebody.tasks import Quantity
+from rebody.tasks.bounds import payable
 from rebody.types import DECISION_DT, GlobalState
 
 SLACK, TOLERANCE = 1.25, 0.01
@@ -17,6 +18,9 @@ STUCK = 10
 """Decisions of one and the same reward, while the body moved, after which it counts as stuck."""
 RECENT_S = 3.2
 """How long a doubt is kept up by default [s]: as long as a belief rests on what was heard."""
+
+Ends = tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]
+"""Between which a quantity was meanwhile; each family's has a size of its own."""
 
 
 @dataclass
@@ -45,7 +49,7 @@ class RewardWatch:
 
     def __init__(self, contract: Contract):
         self._contract = contract
-        self._families = [family for family in FAMILIES if family.name in contract.target_ranges]
+        self._families = contract.families
         self._impossible, self._untrained, self._stuck = _Seen(), _Seen(), _Seen()
         self._decisions, self._same = 0, 0
         self._last_reward: float | None = None
@@ -53,16 +57,16 @@ class RewardWatch:
     def hear(self, previous: GlobalState, state: GlobalState, reward: float) -> bool:
         """Whether a reward can be believed: some target of some family could have paid it, and it is not stuck."""
         self._decisions += 1
-        moved = {family.name: _moved(family.quantity.name, previous, state) for family in self._families}
-        self._count_same(reward, all(before != after for before, after in moved.values()))
-        bounds = self._bounds(moved, {})
+        moved = [_moved(family.quantity, previous, state) for family in self._families]
+        self._count_same(reward, all(np.any(before != after) for before, after in moved))
+        bounds = self._bounds(moved, trained=False)
         if _is_beyond(reward, bounds):
             self._impossible.add(self._decisions, reward, bounds)
             return False
         if self._same >= STUCK:
             self._stuck.add(self._decisions, reward, bounds)
             return False
-        if _is_beyond(reward, bounds := self._bounds(moved, self._contract.target_ranges)):
+        if _is_beyond(reward, bounds := self._bounds(moved, trained=True)):
             self._untrained.add(self._decisions, reward, bounds)
         return True
 
@@ -73,10 +77,10 @@ class RewardWatch:
     def doubts(self, within_s: float = RECENT_S) -> tuple[str, ...]:
         """Sentences about rewards of the last seconds that were not believed; none where all is plausible."""
         worst, best = self._impossible.bounds
-        form = "-|error| / max(|target|, floor)" if self._contract.reward == "relative" else "-|error|"
+        laws = " or ".join(dict.fromkeys(family.reward_law.formula for family in self._families))
         beyond = (
             f"{self._impossible.says}, which no target of {self._names} pays there (at the last one {worst:.3g} to "
-            f"{best:.3g}); it was not believed. The module expects {form}, without bonuses, costs or another scale."
+            f"{best:.3g}); it was not believed. The module expects {laws}, without bonuses, costs or another scale."
         )
         stuck = (
             f"{self._stuck.says}, the same to the last digit, though the body moved; it was not believed. "
@@ -106,17 +110,17 @@ class RewardWatch:
         self._same = self._same + 1 if is_same and has_moved else 1
         self._last_reward = reward
 
-    def _bounds(self, moved: dict[str, tuple[float, float]], ranges: dict[str, tuple[float, float]]):
-        """Over all families, by the targets of their ranges; by any target of a family that has none there."""
+    def _bounds(self, moved: list[Ends], *, trained: bool) -> tuple[float, float]:
+        """Over all families, by the targets that the module was trained on, or by any."""
         of_each = [
-            payable(family, self._contract.reward, moved[family.name], ranges.get(family.name, ANY))
-            for family in self._families
+            payable(family, ends, family.range if trained else None)
+            for family, ends in zip(self._families, moved, strict=True)
         ]
         return min(worst for worst, _ in of_each), max(best for _, best in of_each)
 
 
-def _moved(field: str, previous: GlobalState, state: GlobalState) -> tuple[float, float]:
-    before, after = (float(np.ravel(getattr(each, field))[0]) for each in (previous, state))
+def _moved(quantity: Quantity, previous: GlobalState, state: GlobalState) -> Ends:
+    before, after = (np.asarray(quantity.read(each), float).reshape(-1, quantity.size)[0] for each in (previous, state))
     return before, after
 
 

@@ -10,32 +10,34 @@ from rebody.agents.parts import (
     LoadedTracker,
 )
 from rebody.bodies import RobotSpec
-from rebody.control.high_level import Places
+from rebody.control.places import Places, numbers_of
 from rebody.control.sac import Actor
 from rebody.errors import RebodyError
-from rebody.inference.encoder import Encoder
 
 
-def check_sizes(part: LoadedTracker | LoadedFlat | LoadedScratch | LoadedHighLevel, spec: RobotSpec, module: Encoder):
+def check_sizes(part: LoadedTracker | LoadedFlat | LoadedScratch | LoadedHighLevel, spec: RobotSpec, module: Inference):
     """RebodyError where a policy does not see what the robot and the module's beliefs give, or moves other joints."""
+    latent = module.parts.module.encoder.latent
     match part:
         case LoadedTracker(tracker=tracker):
             _check_actor(part.name, tracker.actor, tracker.actor.observations, spec.model.nu)
         case LoadedFlat(policy=policy):
             _check_places(part.name, policy.view.places, module)
-            _check_actor(part.name, policy.actor, policy.view.size(spec.joint_inputs, module.latent), spec.model.nu)
+            _check_actor(part.name, policy.actor, policy.view.size(spec.joint_inputs, latent), spec.model.nu)
         case LoadedScratch(parts=parts):
             own = parts.module.encoder.latent
             _check_actor(part.name, parts.policy.actor, parts.policy.view.size(spec.joint_inputs, own), spec.model.nu)
         case LoadedHighLevel(policy=policy):
             _check_places(part.name, policy.view.places, module)
-            _check_actor(part.name, policy.actor, policy.view.size(module.latent), len(policy.slots))
+            if [slot.quantity for slot in policy.slots] != [family.quantity for family in module.contract.families]:
+                raise _misfit(part.name, f"its slots are not those of '{module.name}'")
+            _check_actor(part.name, policy.actor, policy.view.size(latent), numbers_of(policy.slots))
 
 
 def check_predictor(part: LoadedStepPredictor, tracker: LoadedTracker) -> None:
     """RebodyError where a step predictor does not see commands as its tracker does."""
-    if part.predictor.reach != tracker.tracker.reach:
-        raise _misfit(part.name, "its reach is not that of its tracker")
+    if part.predictor.families != tracker.tracker.families:
+        raise _misfit(part.name, "its commands are not those of its tracker")
     _check_actor(part.name, part.predictor.actor, tracker.tracker.actor.observations, 1)
 
 
@@ -44,15 +46,14 @@ def check_slots(part: LoadedSlots, module: Inference) -> None:
     classifier, mixture = part.parts.classifier, module.parts.mixture
     if len(classifier.net.weights[0]) != module.parts.module.encoder.latent:
         raise _misfit(part.name, f"its latent is not that of '{module.name}'")
-    if set(classifier.families) != set(module.contract.families):
+    if part.families != module.contract.families.names:
         raise _misfit(part.name, f"its families are not those of '{module.name}'")
     if mixture is not None and len(part.parts.of_cluster) != len(mixture.active):
         raise _misfit(part.name, f"its clusters are not those of '{module.name}'")
 
 
-def _check_places(name: str, places: Places, module: Encoder) -> None:
-    spoken_of = tuple(zip(module.fields, module.scales, strict=True)) if module.kinds else ()
-    if places != spoken_of:
+def _check_places(name: str, places: Places, module: Inference) -> None:
+    if places != module.parts.high_level.view.places:
         raise _misfit(name, "the places that it sees are not those that the module's beliefs speak of")
 
 

@@ -11,6 +11,7 @@ from rebody.agents.parts import Inference, ScratchParts
 from rebody.agents.slots import OneSlot, SlotChooser
 from rebody.control.slot_policy import SlotPolicy
 from rebody.inference.exact import exact_posterior, read_mode
+from rebody.tasks import FamilySet
 from rebody.types import Task
 
 
@@ -19,6 +20,8 @@ class Ingredients:
     """What agents are made of; each kind takes what it needs."""
 
     inference: Inference
+    families: FamilySet
+    """What subgoals are about: those of the module, and what else is in play."""
     tasks: Task | None
     """The active ones, [time, episode]."""
     slots: SlotChooser | None
@@ -31,7 +34,12 @@ class Ingredients:
     def listening(self) -> dict[str, Any]:
         """Of an agent whose belief is the frozen module's."""
         parts = self.inference.parts
-        return {"inferrer": parts.module.encoder, "reader": parts.probe, "stride": self.stride}
+        return {"inferrer": parts.module.encoder, "reader": parts.probe, **self.speaking}
+
+    @property
+    def speaking(self) -> dict[str, Any]:
+        """Of any agent."""
+        return {"families": self.families, "stride": self.stride}
 
     @property
     def told(self) -> dict[str, Any]:
@@ -57,7 +65,7 @@ def _reuse(of: Ingredients) -> Agent:
         interpret=parts.module.decoder.interpret,
         high_level=parts.high_level,
         toy=of.inference.toy,
-        slots=of.slots or OneSlot(of.inference.contract.families[0]),  # a point mass has no slots: one stands for all
+        slots=of.slots or OneSlot(),  # a point mass has no slots: the first family stands for all
         horizon=of.horizon,
     )
 
@@ -72,8 +80,8 @@ def _readout(of: Ingredients) -> Agent:
 
 
 def _bayes(of: Ingredients) -> Agent:
-    posterior = exact_posterior(of.inference.contract.target_ranges, of.inference.contract.reward)
-    return ReadoutAgent(inferrer=posterior, reader=read_mode, stride=of.stride, **of.told)
+    posterior = exact_posterior(of.inference.contract.families)
+    return ReadoutAgent(inferrer=posterior, reader=read_mode, **of.speaking, **of.told)
 
 
 def _oracle(of: Ingredients) -> Agent:
@@ -88,7 +96,7 @@ def _flat(of: Ingredients) -> Agent:
 
 def _scratch(of: Ingredients) -> Agent:
     assert of.scratch is not None
-    return FlatAgent(inferrer=of.scratch.module.encoder, reader=of.scratch.probe, stride=of.stride)
+    return FlatAgent(inferrer=of.scratch.module.encoder, reader=of.scratch.probe, **of.speaking)
 
 
 def _idle(of: Ingredients) -> Agent:

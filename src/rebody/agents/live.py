@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from rebody import inputs
-from rebody.agents.agent import Carry, Observation
+from rebody.agents.agent import Carry, Observation, standing_still
 from rebody.agents.build import HORIZON, build_agent, check_robot_of, slot_chooser
 from rebody.agents.clock import begin, decide, pass_over
 from rebody.agents.controller import TrackerController
@@ -19,7 +19,6 @@ from rebody.agents.rollout import joint_action
 from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
-from rebody.tasks import FAMILIES, VELOCITY
 from rebody.types import Belief, Subgoal
 
 ON_BAD_INPUT = ("error", "hold")
@@ -60,12 +59,13 @@ class LiveAgent:
         if on_bad_input not in ON_BAD_INPUT:
             raise RebodyError(f"on_bad_input is {on_bad_input!r}; choose one of {', '.join(ON_BAD_INPUT)}.")
         check_robot_of(tracker, spec)
-        inference.contract.check_body(spec.name, spec.moving_fields, tracker.tracker.slots)
+        inference.contract.check_body(spec.name, spec.moving_fields, tracker.tracker.families.names)
         self._spec, self._inference, self._on_bad_input = spec, inference, on_bad_input
-        self._controller = TrackerController(tracker.tracker, spec.goal_ahead)
-        self._agent = build_agent(
-            "reuse", inference, slots=slot_chooser(inference, slots, "classifier"), horizon=horizon
-        )
+        # the tracker's own, too: a command to stand still need not be one that the module knows
+        self._families = inference.contract.families.beside(tracker.tracker.families)
+        self._controller = TrackerController(tracker.tracker, self._families, spec.goal_ahead)
+        chooser = slot_chooser(inference, slots, "classifier")
+        self._agent = build_agent("reuse", inference, families=self._families, slots=chooser, horizon=horizon)
         self.reset()
 
     def reset(self) -> None:
@@ -93,9 +93,8 @@ class LiveAgent:
         if self._steps % self._spec.steps_per_decision == 0:
             self._decide(qpos, heard, is_whole)
         self._steps, self._last_x, self._observation = self._steps + 1, x if is_whole else None, observation
-        pitch, joints = self._spec.pitch(qpos), self._spec.tracker_state(qpos, qvel, self._pace)
-        x, pitch = np.asarray(x, np.float32), np.asarray(pitch, np.float32)
-        return np.asarray(joint_action(self._controller, joints, x, pitch, self._told, self._heard.belief))
+        pose, joints = self._spec.pose(qpos), self._spec.tracker_state(qpos, qvel, self._pace)
+        return np.asarray(joint_action(self._controller, joints, pose, self._told, self._heard.belief))
 
     @property
     def belief(self) -> Belief:
@@ -104,10 +103,11 @@ class LiveAgent:
 
     @property
     @own_jax_settings()
-    def inferred(self) -> tuple[str, float]:
-        """Family and target [m, m/s] that a linear probe reads from the belief; the agent does not use it."""
-        family, target = self._inference.parts.probe(self._heard.belief)
-        return FAMILIES[int(family)].name, float(target)
+    def inferred(self) -> tuple[str, tuple[float, ...]]:
+        """Family and target [m, m/s, rad] that a linear probe reads from the belief; the agent does not use it."""
+        which, target = self._inference.parts.probe(self._heard.belief)
+        family = self._inference.contract.families[which]
+        return family.name, tuple(np.asarray(target)[: family.size].tolist())
 
     @property
     def subgoal(self) -> Subgoal:
@@ -129,10 +129,9 @@ class LiveAgent:
     @property
     def _told(self) -> Subgoal:
         """The subgoal that the tracker follows now."""
-        subgoal = self._heard.command.subgoal
         if not self._stands_still:
-            return subgoal
-        return Subgoal(jnp.full_like(subgoal.slot, VELOCITY), jnp.zeros_like(subgoal.value))
+            return self._heard.command.subgoal
+        return standing_still(self._families, ())
 
     @property
     def _stands_still(self) -> bool:

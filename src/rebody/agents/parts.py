@@ -1,6 +1,6 @@
 """From artifacts to parts."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,21 +24,22 @@ from rebody.agents.configs import (
 from rebody.agents.slots import SlotClassifier
 from rebody.bodies.toys import Toy
 from rebody.control.flat import FlatPolicy, FlatView
-from rebody.control.high_level import HighLevelPolicy, PolicyView, TaskCode
+from rebody.control.high_level import HighLevelPolicy, PolicyView
+from rebody.control.places import Place, Places, TaskCode, numbers_of, places_of
 from rebody.control.sac import Actor, SACConfig
 from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import StepPredictor
 from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
-from rebody.inference import InferenceModule
+from rebody.inference import InferenceConfig, InferenceModule
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import MixturePrior, no_mixture
-from rebody.inference.probe import Probe
+from rebody.inference.probe import Probe, unfitted
 from rebody.jax_settings import own_jax_settings
 from rebody.nn import MLP
 from rebody.store import arrays_into_tree, load_artifact
 from rebody.store.typed import Typed
-from rebody.tasks import FAMILIES, family_index
+from rebody.tasks import FamilySet
 from rebody.types import AnyArray, Tree
 
 
@@ -64,7 +65,7 @@ class Inference:
     @property
     def task_code(self) -> TaskCode:
         """How a task is put to the policy that is told it."""
-        return task_code(self.contract.target_ranges)
+        return TaskCode(places_of(self.contract.families))
 
     @own_jax_settings()
     def begin(self, state: Any) -> LiveBelief:
@@ -154,19 +155,21 @@ class LoadedSlots:
     name: str
     inference_hash: str
     """Of the module's weights."""
+    families: tuple[str, ...]
+    """Of the module, in its order."""
     parts: SlotParts
 
 
 def inference_template(settings: InferenceSettings) -> InferenceParts:
     """Parts of the right shapes, to be filled with weights."""
-    policy, module, ranges = settings.high_level, settings.inference, settings.contract.target_ranges
+    policy, module, families = settings.high_level, settings.inference, settings.contract.families
     actions, mixture = settings.make_toy().actions, settings.mixture
-    view = PolicyView(policy.fields, policy.scales, module.places)
+    view, told = PolicyView(policy.fields, policy.scales, module_places(module, families)), places_of(families)
     return InferenceParts(
-        module=InferenceModule(module, actions, jax.random.key(0)),
+        module=InferenceModule(module, families, actions, jax.random.key(0)),
         high_level=_policy_template(view, module.latent, actions, policy),
-        told_policy=_policy_template(told_view(view, ranges), 2 * len(ranges), actions, policy),
-        probe=_probe_template(module.latent, len(ranges)),
+        told_policy=_policy_template(told_view(view, families), len(told) + numbers_of(told), actions, policy),
+        probe=unfitted(families, module.latent),
         mixture=no_mixture(mixture.maximum, module.clustered) if mixture else None,
     )
 
@@ -174,7 +177,8 @@ def inference_template(settings: InferenceSettings) -> InferenceParts:
 def tracker_template(settings: TrackerSettings) -> Tracker:
     """A tracker of the right shapes, to be filled with weights."""
     return Tracker(
-        _actor_template(settings.observations, settings.actions, settings.hidden, settings.projections), settings.reach
+        _actor_template(settings.observations, settings.actions, settings.hidden, settings.projections),
+        settings.families,
     )
 
 
@@ -186,41 +190,39 @@ def flat_template(settings: FlatSettings) -> FlatPolicy:
 
 def scratch_template(settings: ScratchSettings) -> ScratchParts:
     """Parts of the right shapes, to be filled with weights."""
-    module = settings.inference
+    module, families = settings.inference, settings.contract.families
     actor = _actor_template(settings.observations, settings.actions, settings.hidden, settings.projections)
     return ScratchParts(
-        module=InferenceModule(module, settings.actions, jax.random.key(0)),
-        policy=FlatPolicy(actor, FlatView(module.places)),
-        probe=_probe_template(module.latent, len(settings.contract.target_ranges)),
+        module=InferenceModule(module, families, settings.actions, jax.random.key(0)),
+        policy=FlatPolicy(actor, FlatView(module_places(module, families))),
+        probe=unfitted(families, module.latent),
     )
 
 
 def slot_policy_template(settings: HighLevelSettings) -> SlotPolicy:
     """A high-level policy of a robot of the right shapes, to be filled with weights."""
-    slots = tuple((family_index(name), scale) for name, scale in settings.slots.items())
-    return SlotPolicy(
-        _actor_template(settings.observations, len(slots), settings.hidden, settings.projections), settings.view, slots
-    )
+    actions = numbers_of(settings.slots)
+    actor = _actor_template(settings.observations, actions, settings.hidden, settings.projections)
+    return SlotPolicy(actor, settings.view, settings.slots)
 
 
 def step_predictor_template(settings: StepPredictorSettings) -> StepPredictor:
     """A step predictor of the right shapes, to be filled with weights."""
     return StepPredictor(
-        _actor_template(settings.observations, 1, settings.hidden, settings.projections), settings.reach
+        _actor_template(settings.observations, 1, settings.hidden, settings.projections), settings.families
     )
 
 
 def slots_template(settings: ClassifierSettings) -> SlotParts:
     """A classifier of the right shapes, to be filled with weights."""
     net = MLP(settings.latent, len(settings.families), settings.hidden, key=jax.random.key(0))
-    return SlotParts(SlotClassifier(net, settings.families), np.zeros(settings.components, np.int32))
+    return SlotParts(SlotClassifier(net), np.zeros(settings.components, np.int32))
 
 
 @own_jax_settings()
 def load_inference(reference: str) -> Inference:
     """A shipped inference artifact by name, or one in a folder; RebodyError if it cannot be read."""
     name, settings, parts = _load(reference, "inference", InferenceSettings, inference_template)
-    _check_indices(name, "probe.families", parts.probe.families, settings.contract.families)
     return Inference(name, settings.contract, parts, settings.make_toy())
 
 
@@ -239,7 +241,6 @@ def load_flat(reference: str) -> LoadedFlat:
 def load_scratch(reference: str) -> LoadedScratch:
     """A shipped scratch artifact by name, or one in a folder; RebodyError if it cannot be read."""
     name, settings, parts = _load(reference, "scratch", ScratchSettings, scratch_template)
-    _check_indices(name, "probe.families", parts.probe.families, settings.contract.families)
     return LoadedScratch(name, settings.robot, settings.contract, parts)
 
 
@@ -258,8 +259,13 @@ def load_step_predictor(reference: str) -> LoadedStepPredictor:
 def load_slots(reference: str) -> LoadedSlots:
     """A shipped classifier by name, or one in a folder; RebodyError if it cannot be read."""
     name, settings, parts = _load(reference, "classifier", ClassifierSettings, slots_template)
-    _check_indices(name, "of_cluster", parts.of_cluster, settings.families)
-    return LoadedSlots(name, settings.inference_hash, parts)
+    slots = np.asarray(parts.of_cluster)
+    if len(slots) and not 0 <= slots.min() <= slots.max() < len(settings.families):
+        raise RebodyError(
+            f"the weights of artifact '{name}' are not understood (of_cluster: {slots.min()} to {slots.max()} are not "
+            f"indices of {', '.join(settings.families)}). Copy or make the artifact anew."
+        )
+    return LoadedSlots(name, settings.inference_hash, settings.families, parts)
 
 
 def load_slots_of(inference: Inference, reference: str | None) -> LoadedSlots | None:
@@ -269,14 +275,17 @@ def load_slots_of(inference: Inference, reference: str | None) -> LoadedSlots | 
     return load_slots(f"classifier-{inference.name}" if reference is None else reference)
 
 
-def task_code(target_ranges: Mapping[str, tuple[float, float]]) -> TaskCode:
-    """Targets divided by the largest of their family."""
-    return TaskCode(tuple((family_index(name), max(abs(end) for end in ends)) for name, ends in target_ranges.items()))
+def module_places(config: InferenceConfig, families: FamilySet) -> Places:
+    """What a split latent says the places of (`Decoder.interpret`), in units of the encoder's scales; else none."""
+    scale_of = dict(zip(config.fields, config.scales, strict=True))
+    if not config.kinds:
+        return ()
+    return tuple(Place(each.quantity, tuple(scale_of[name] for name in each.quantity.components)) for each in families)
 
 
-def told_view(view: PolicyView, target_ranges: Mapping[str, tuple[float, float]]) -> PolicyView:
-    """What a policy that is told its task sees, beside one that sees a belief: places where that sees places."""
-    return replace(view, places=task_code(target_ranges).places if view.places else ())
+def told_view(view: PolicyView, families: FamilySet) -> PolicyView:
+    """What a privileged policy sees, beside one that sees a belief: places where that sees places."""
+    return replace(view, places=places_of(families) if view.places else ())
 
 
 def _load(
@@ -289,23 +298,8 @@ def _load(
     return artifact.name, settings, arrays_into_tree(shapes, artifact.arrays, f"artifact {artifact.name}")
 
 
-def _check_indices(name: str, array: str, found: Int[AnyArray, " index"], families: tuple[int, ...]) -> None:
-    """RebodyError where weights point at a family that the settings do not name."""
-    if unknown := set(np.asarray(found).tolist()).difference(families):
-        among = ", ".join(FAMILIES[family].name for family in families)
-        raise RebodyError(
-            f"the weights of artifact '{name}' are not understood ({array}: {min(unknown)} is the index of none of "
-            f"{among}). Copy or make the artifact anew."
-        )
-
-
 def _policy_template(view: PolicyView, believed: int, actions: int, sizes: ToyPolicySettings) -> HighLevelPolicy:
     return HighLevelPolicy(_actor_template(view.size(believed), actions, sizes.hidden, sizes.projections), view)
-
-
-def _probe_template(latent: int, families: int) -> Probe:
-    weights = np.zeros((latent + 1, families), np.float32)
-    return Probe(np.zeros(families, np.int32), weights, weights)
 
 
 def _actor_template(observations: int, actions: int, hidden: tuple[int, ...], projections: int) -> Actor:

@@ -9,12 +9,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from rebody.agents.agent import Agent, Observation
-from rebody.agents.clock import Clock, EvenClock, place
+from rebody.agents.clock import Clock, EvenClock
 from rebody.agents.controller import Controller
 from rebody.bodies import RobotBatch, RobotSpec, Simulation
 from rebody.bodies.toys import Disturbance, Toy
-from rebody.tasks import RewardForm, reward
-from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task
+from rebody.tasks import FamilySet
+from rebody.types import AnyArray, Belief, GlobalState, Pose, Subgoal, Task
 
 Starts = Sequence[int] | Int[np.ndarray, " episode"]
 """What the reset noise of each episode is drawn from."""
@@ -33,10 +33,10 @@ class Episodes(eqx.Module):
 
 @eqx.filter_jit
 def rollout_on_toy(
-    agent: Agent, toy: Toy, tasks: Task, form: RewardForm, disturbance: Disturbance | None = None
+    agent: Agent, toy: Toy, tasks: Task, families: FamilySet, disturbance: Disturbance | None = None
 ) -> Episodes:
-    """Episodes on a toy from x = 0 at rest; `tasks` are the active ones, [time, episode]."""
-    still = jnp.zeros(tasks.target.shape[1])
+    """Episodes on a toy from x = 0 at rest; `tasks` are the active ones, [time, episode], of `families`."""
+    still = jnp.zeros(tasks.family.shape[1])
     body = toy.initial(still, still, disturbance)
     carry, command = agent.begin(toy.observe(body))
 
@@ -45,11 +45,11 @@ def rollout_on_toy(
         task, key = inputs
         body = toy.step(body, command.action, key)
         state = toy.observe(body)
-        earned = reward(task, state, form)
+        earned = families.reward(task, state)
         carry, following = agent.decide(carry, Observation(state, earned))
         return (body, carry, following), (state, earned, carry.belief, command.subgoal)
 
-    keys = jax.random.split(jax.random.key(0), len(tasks.target))
+    keys = jax.random.split(jax.random.key(0), len(tasks.family))
     _, (state, earned, belief, subgoal) = jax.lax.scan(advance, (body, carry, command), (tasks, keys))
     return Episodes(state, earned, belief, subgoal, still > 0)
 
@@ -62,7 +62,7 @@ class Drive:
         agent: Agent,
         controller: Controller | None,
         body: Simulation,
-        form: RewardForm,
+        families: FamilySet,
         clock: Clock | None = None,
     ):
         """Without a controller the agent's own action moves them, as on a point mass.
@@ -71,7 +71,7 @@ class Drive:
         """
         self.agent, self.steps = agent, 0
         self._controller, self._body = controller, body
-        self._form: RewardForm = form
+        self._families = families
         self._clock = clock or EvenClock(body.steps_per_decision)
         self.carry, self.command = self._clock.begin(agent, body.observe())
         self._steps_left = self._clock.steps(body, self.command.subgoal)
@@ -88,7 +88,7 @@ class Drive:
         if not due.any() and self.steps % body.steps_per_decision:
             return None
         state = body.observe()
-        heard = Observation(state, task_reward(task, state, self._form))
+        heard = Observation(state, task_reward(self._families, task, state))
         if due.any():
             self.carry, self.command = self._clock.decide(self.agent, self.carry, heard, due)
             self._steps_left = np.where(due, self._clock.steps(body, self.command.subgoal), self._steps_left)
@@ -100,7 +100,7 @@ def rollout_on_robot(
     controller: Controller,
     spec: RobotSpec,
     tasks: Task,
-    form: RewardForm,
+    families: FamilySet,
     starts: Starts,
     on_frame: OnFrame | None = None,
     clock: Clock | None = None,
@@ -111,11 +111,11 @@ def rollout_on_robot(
     Nothing ends early: a fallen robot lies there and keeps scoring. `on_frame` is called at every control step.
     What is returned is 0.1 s apart, whatever the clock.
     """
-    decisions, size = tasks.target.shape
+    decisions, size = tasks.family.shape
     body = RobotBatch(spec, size)
     for episode, seed in enumerate(starts):
         body.reset(np.random.default_rng(seed), np.arange(size) == episode)
-    drive = Drive(agent, controller, body, form, clock)
+    drive = Drive(agent, controller, body, families, clock)
     fell, records = np.zeros(size, bool), []
     for step in range(decisions * body.steps_per_decision):
         i, of_decision = divmod(step, body.steps_per_decision)
@@ -132,23 +132,23 @@ def rollout_on_robot(
 
 def follow(controller: Controller, body: Simulation, subgoal: Subgoal, belief: Belief | None = None) -> None:
     """One control step of every robot."""
-    body.step(np.asarray(joint_action(controller, controller.see(body), *place(body), subgoal, belief)))
+    pose = body.pose().astype(np.float32)
+    body.step(np.asarray(joint_action(controller, controller.see(body), pose, subgoal, belief)))
 
 
 @eqx.filter_jit
 def joint_action(
     controller: Controller,
     joints: Float[AnyArray, "*episode joint"],
-    x: Float[AnyArray, "*episode"],
-    pitch: Float[AnyArray, "*episode"],
+    pose: Pose,
     subgoal: Subgoal,
     belief: Belief | None,
 ) -> Float[AnyArray, "*episode action"]:
-    """What the controller does with the joints of robots at x [m] and pitch [rad]."""
-    return controller(joints, x, pitch, subgoal, belief)
+    """What the controller does with the joints of robots in these poses."""
+    return controller(joints, pose, subgoal, belief)
 
 
 @eqx.filter_jit
-def task_reward(task: Task, state: GlobalState, form: RewardForm) -> Float[AnyArray, "*episode"]:
-    """`rebody.tasks.reward`, compiled."""
-    return reward(task, state, form)
+def task_reward(families: FamilySet, task: Task, state: GlobalState) -> Float[AnyArray, "*episode"]:
+    """`FamilySet.reward`, compiled."""
+    return families.reward(task, state)

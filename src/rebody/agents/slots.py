@@ -12,7 +12,7 @@ from rebody.types import AnyArray, Belief
 
 
 class SlotChooser(eqx.Module):
-    """Belief -> slot, an index into `rebody.tasks.FAMILIES`."""
+    """Belief -> slot, an index into the families of the module."""
 
     @abstractmethod
     def __call__(self, belief: Belief) -> Int[AnyArray, "*batch"]:
@@ -22,7 +22,7 @@ class SlotChooser(eqx.Module):
 class OneSlot(SlotChooser):
     """For a module of one family there is nothing to choose."""
 
-    family: int = eqx.field(static=True)
+    family: int = eqx.field(static=True, default=0)
 
     def __call__(self, belief: Belief) -> Int[AnyArray, "*batch"]:
         """Always the same."""
@@ -33,15 +33,14 @@ class SlotClassifier(SlotChooser):
     """A logit per slot from the latent, learned with labels on the toy (thesis 6.4)."""
 
     net: MLP
-    families: tuple[int, ...] = eqx.field(static=True)
 
     def logits(self, belief: Belief) -> Float[AnyArray, "*batch slot"]:
-        """Of each family's slot, in the order of `families`."""
+        """Of each family's slot."""
         return self.net(belief.mean)
 
     def __call__(self, belief: Belief) -> Int[AnyArray, "*batch"]:
         """The likeliest."""
-        return jnp.asarray(self.families)[jnp.argmax(self.logits(belief), axis=-1)]
+        return jnp.argmax(self.logits(belief), axis=-1)
 
 
 class SlotOfCluster(SlotChooser):

@@ -2,15 +2,19 @@
 
 import math
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import msgspec
 
+from rebody import inputs
 from rebody.bodies.model import Space
 from rebody.bodies.robot import Fall, Reach, RobotSpec
 from rebody.errors import RebodyError, unknown
 from rebody.names import ROBOTS, shipped_robots
+from rebody.ranges import Box
 from rebody.store.files import TEXT, read_file
 
 GYMNASIUM_ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
@@ -32,13 +36,6 @@ class _Fall(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     lasts_s: float = Fall.lasts_s
 
 
-class _Reach(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    speed: tuple[float, float]
-    distance: float = Reach.distance
-    pitch: tuple[float, float] | None = None
-    jump: tuple[float, float] | None = None
-
-
 class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a robot's file says; `RobotSpec` says what it means."""
 
@@ -46,7 +43,7 @@ class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     frame_skip: int
     root: _Root
     fall: _Fall
-    reach: _Reach
+    reach: dict[str, list[Any]]
     keyframe: str | None = None
     rest: dict[str, float] = {}
     timestep: float | None = None
@@ -87,7 +84,7 @@ def _read(path: Path) -> RobotSpec:
         smoothing_s=description.smoothing_s,
         goal_ahead=description.goal_ahead,
         fall=Fall(**msgspec.structs.asdict(description.fall)),
-        reach=Reach(**msgspec.structs.asdict(description.reach)),
+        reach=_reach(description.reach, path),
     )
     _check_values(spec, path)
     return spec
@@ -111,17 +108,20 @@ def _root(root: _Root, path: Path) -> tuple[str, str, str] | str:
     )
 
 
-def reach_problems(reach: Reach) -> list[str]:
-    """What cannot be asked of any robot."""
-    problems = []
-    low, high = reach.speed
-    if not low < high or not reach.distance > 0:
-        problems.append("distance must be positive, speed = [slowest, fastest] ascending")
-    if reach.pitch is not None and not reach.pitch[0] < reach.pitch[1]:
-        problems.append("pitch = [lowest, highest] must be ascending")
-    if reach.jump is not None and not 0 < reach.jump[0] < reach.jump[1]:
-        problems.append("jump = [slowest, fastest] must be positive and ascending")
-    return problems
+def _reach(said: Mapping[str, Any], path: Path) -> Reach:
+    """A pair of ends for each number of a family's target; one pair where there is one."""
+    boxes = {}
+    for family, ends in said.items():
+        pairs = ends if ends and isinstance(ends[0], list) else [ends]
+        where = f"'{path}': [reach] {family}"
+        low, high = inputs.numbers(pairs, (len(pairs), 2), "pairs of ends", where).T.tolist()
+        try:
+            boxes[family] = Box(tuple(low), tuple(high))
+        except ValueError as error:
+            raise RebodyError(f"{where}: {error}.") from None
+    if not boxes:
+        raise RebodyError(f"'{path}': [reach] names no family, such as velocity = [-1.0, 1.0]. See docs/own-robot.md.")
+    return tuple(boxes.items())
 
 
 def _check_values(spec: RobotSpec, path: Path) -> None:
@@ -140,6 +140,5 @@ def _check_values(spec: RobotSpec, path: Path) -> None:
         problems.append("goal_ahead must be positive")
     if not spec.fall.max_pitch > 0 or not spec.fall.lasts_s >= 0 or not spec.fall.min_up < 1:
         problems.append("[fall] max_pitch must be positive, lasts_s not negative, min_up less than 1")
-    problems += [f"[reach] {problem}" for problem in reach_problems(spec.reach)]
     if problems:
         raise RebodyError(f"'{path}': {'; '.join(problems)}.")

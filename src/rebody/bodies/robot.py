@@ -15,7 +15,7 @@ from rebody.bodies.control_step import steps_per_decision
 from rebody.bodies.model import PLANE_JOINTS, Compiled, Space, compile_model
 from rebody.bodies.readout import HINGE, SLIDE, FreeReadout, PlanarReadout, Readout
 from rebody.errors import RebodyError
-from rebody.ranges import Finite, Positive
+from rebody.ranges import Box
 from rebody.types import GlobalState
 
 
@@ -33,36 +33,8 @@ class Fall:
     """Seconds without a break."""
 
 
-@dataclass(frozen=True)
-class Reach:
-    """What may be asked of a robot's tracker."""
-
-    speed: tuple[Finite, Finite]
-    """Fastest backward (negative) and forward [m/s]."""
-    distance: Positive = 5.0
-    """Farthest goal [m]; farther ones are cut to it."""
-    pitch: tuple[Finite, Finite] | None = None
-    """Pitches that it can stand at [rad]; None for a robot that is not asked to."""
-    jump: tuple[Finite, Finite] | None = None
-    """Vertical speeds that it can jump at [m/s]; None for a robot that is not asked to."""
-
-    @property
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Smallest and largest value of each slot that it has, by the family's name [m ahead, m/s, rad, m/s]."""
-        ends = {
-            "goal": (-self.distance, self.distance),
-            "velocity": self.speed,
-            "stand": self.pitch,
-            "jump": self.jump,
-        }
-        return {name: limits for name, limits in ends.items() if limits is not None}
-
-    def within(self, family: str, low: float, high: float) -> tuple[float, float]:
-        """What it reaches of a family's targets from `low` to `high`; goals may lie farther off than `distance`."""
-        if family == "goal" or family not in self.limits:
-            return low, high
-        lowest, highest = self.limits[family]
-        return max(low, lowest), min(high, highest)
+Reach = tuple[tuple[str, Box], ...]
+"""What may be asked of a robot's tracker: families by name, each with a range [m ahead, m/s, rad]."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """The commands of `rebody`: what each is called and where it is. Only the one that is asked for is imported."""
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, make_dataclass
 from importlib import import_module
@@ -7,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
+from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
 from rebody.names import first_lines
 
@@ -59,6 +61,28 @@ def union_of(arguments: Sequence[str]) -> Any:
     return subcommands(
         {command.name: command.load(arguments) if command.name == named else command.stand_in() for command in COMMANDS}
     )
+
+
+def own_types() -> ConstructorRegistry:
+    """Settings that are not written as they are: families come from a file."""
+    registry = ConstructorRegistry()
+
+    @registry.primitive_rule
+    def families(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+        known = sys.modules.get("rebody.tasks.family_set")  # no command that does without JAX waits for it
+        if known is None or asked.type is not known.FamilySet:
+            return None
+        from rebody.tasks.family_file import own_families
+
+        return PrimitiveConstructorSpec(
+            nargs=1,
+            metavar="FILE",
+            instance_from_str=lambda arguments: own_families(Path(arguments[0])),
+            is_instance=lambda value: isinstance(value, known.FamilySet),
+            str_from_instance=lambda families: [", ".join(families.names)],
+        )
+
+    return registry
 
 
 def subcommands(kinds: Mapping[str, Any], lines: Mapping[str, str] = {}) -> Any:

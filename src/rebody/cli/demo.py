@@ -14,8 +14,10 @@ from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import Results, evaluate, save_results, summary_table
 from rebody.evaluation.episode import EpisodeResult
-from rebody.evaluation.evaluate import Trial, take_yardsticks
+from rebody.evaluation.evaluate import take_yardsticks
+from rebody.evaluation.trial import Trial
 from rebody.report import plot_episode, plot_transfer
+from rebody.report.page.tables import vector
 from rebody.store import shipped_artifacts
 from rebody.tasks.task_file import Switch, TaskSpec
 
@@ -83,18 +85,19 @@ def robots_with_tracker() -> list[str]:
 def hidden_tasks(trial: Trial) -> list[TaskSpec]:
     """Goals and speeds, front and back, that the robot can reach in 20 s."""
     assert trial.robot is not None
-    slowest, fastest = trial.robot.reach.speed
+    speeds = dict(trial.robot.reach)["velocity"]
+    (slowest,), (fastest,) = speeds.low, speeds.high
     goals = [round(float(sign * goal), 2) for sign in (-1, 1) for goal in HIDDEN_GOALS]
     both_ways = np.concatenate([np.linspace(-SLOWEST, slowest, SPEEDS), np.linspace(SLOWEST, fastest, SPEEDS)])
-    speeds = [round(float(speed), 2) for speed in both_ways]
-    return [TaskSpec("goal", goal) for goal in goals] + [TaskSpec("velocity", speed) for speed in speeds]
+    tasks = [TaskSpec("goal", (goal,)) for goal in goals]
+    return tasks + [TaskSpec("velocity", (round(float(speed), 2),)) for speed in both_ways]
 
 
 def shown_task(trial: Trial) -> TaskSpec:
     """Run forward, then go back to where it began."""
     assert trial.robot is not None
-    speed = round(0.6 * trial.robot.reach.speed[1], 2)
-    return TaskSpec("velocity", speed, Switch(at_s=CHANGE_S, family="goal", target=2.0))
+    speed = round(0.6 * dict(trial.robot.reach)["velocity"].high[0], 2)
+    return TaskSpec("velocity", (speed,), Switch(at_s=CHANGE_S, family="goal", target=(2.0,)))
 
 
 def _table(reuse: Results, oracle: Results, idle: Results) -> Table:
@@ -104,8 +107,8 @@ def _table(reuse: Results, oracle: Results, idle: Results) -> Table:
         table.add_column(column, justify="right")
     for found, told, still in zip(reuse.episodes, oracle.episodes, idle.episodes, strict=True):
         table.add_row(
-            f"{found.family} {found.target:+.2f}",
-            f"{found.inferred_family[-1]} {found.inferred_target[-1]:+.2f}",
+            f"{found.family} {vector(found.target, '+.2f')}",
+            f"{found.inferred_family[-1]} {vector(found.inferred_target[-1], '+.2f')}",
             *(_error(episode) for episode in (found, told, still)),
         )
     return table

@@ -14,7 +14,7 @@ from rebody.evaluation import save_results
 from rebody.evaluation.diagnosis import LADDER, diagnose, diagnosis_tables
 from rebody.ranges import Seeds
 from rebody.report.diagnosis import plot_diagnosis
-from rebody.tasks.task_file import read_tasks
+from rebody.tasks.task_file import read_tasks, task_entries
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,9 @@ class Diagnose:
         if self.out is not None:
             for agent in LADDER:
                 check_output(self.out / f"{agent}.json", "--out", inputs=(self.tasks,))
-        specs, trial, console = read_tasks(self.tasks), self.trial.load(), Console()
+        task_entries(self.tasks)
+        trial, console = self.trial.load(), Console()
+        specs = read_tasks(self.tasks, trial.in_play)
         with console.status("") as status:
             diagnosis = diagnose(trial, specs, self.seeds, lambda agent: status.update(_doing(agent)))
         for table in diagnosis_tables(diagnosis):

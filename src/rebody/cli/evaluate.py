@@ -10,9 +10,10 @@ from rich.console import Console
 from rebody.cli.output import check_output
 from rebody.cli.trial import TrialOptions
 from rebody.evaluation import evaluate, save_results, summary_table
-from rebody.evaluation.evaluate import Trial, Yardsticks, take_yardsticks
+from rebody.evaluation.evaluate import Yardsticks, take_yardsticks
+from rebody.evaluation.trial import Trial
 from rebody.ranges import Seeds
-from rebody.tasks.task_file import read_tasks
+from rebody.tasks.task_file import read_tasks, task_entries
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,9 @@ class Evaluate:
     def run(self) -> None:
         """Evaluate, print the table, save."""
         check_output(self.json, "--json", inputs=(self.tasks, self.trial.robot))
-        specs = read_tasks(self.tasks)
+        task_entries(self.tasks)
         trial = self.trial.load()
+        specs = read_tasks(self.tasks, trial.in_play)
         console = Console()
         with console.status(f"{len(specs) * self.seeds} episodes of {trial.seconds:g} s"):
             yardsticks = take_yardsticks(trial, specs, self.seeds)

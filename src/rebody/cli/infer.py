@@ -22,6 +22,7 @@ from rebody.evaluation.logs import (
     save_beliefs,
 )
 from rebody.report import plot_beliefs
+from rebody.tasks.family_file import read_families
 
 TABLE, PICTURE = "belief.csv", "belief.png"
 
@@ -34,6 +35,8 @@ class Infer:
     """CSV with the columns time_s, reward, and those that the module sees: position_m, velocity_m_s, pitch_rad."""
     inference: str = "goal-velocity"
     """Inference artifact: a shipped name or a folder."""
+    families: Path | None = None
+    """File of your own families, where the module knows any with a reward law of your own."""
     out: Path | None = None
     """Folder for belief.csv and belief.png."""
     skip_bad_rows: bool = False
@@ -50,6 +53,7 @@ class Infer:
         """Read, listen, write, say what is believed at the end."""
         for name in (TABLE, PICTURE):
             check_output(self.out and self.out / name, "--out", inputs=(self.log,))
+        read_families(self.families)  # artifacts may name its laws
         inference, console = load_inference(self.inference), Console(soft_wrap=True)
         contract = inference.contract
         form = Format(self.delimiter, self.decimal_comma, self.time_unit)

@@ -24,7 +24,7 @@ class List:
         for robot in names.shipped_robots():
             table.add_row("body", robot, "MuJoCo robot")
         tables = {
-            "family": names.FAMILIES,
+            "family": names.families(),
             "agent": names.AGENTS,
             "preset": names.presets(),
             "artifact": names.artifact_titles(),

@@ -10,7 +10,7 @@ from typing import Any
 import tyro
 from rich.console import Console
 
-from rebody.cli.commands import union_of
+from rebody.cli.commands import own_types, union_of
 from rebody.cli.machine import fault_of_machine
 from rebody.errors import RebodyError
 from rebody.ranges import check_ranges
@@ -57,7 +57,8 @@ def run(arguments: list[str]) -> int:
 
 def parse(arguments: list[str]) -> Any:
     """The command with its options; prints help or usage and exits where tyro does."""
-    return tyro.cli(union_of(arguments), prog="rebody", args=arguments, description=DESCRIPTION)
+    command = union_of(arguments)
+    return tyro.cli(command, prog="rebody", args=arguments, description=DESCRIPTION, registry=own_types())
 
 
 def _own_settings() -> AbstractContextManager[None]:

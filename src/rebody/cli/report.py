@@ -9,6 +9,7 @@ from rich.console import Console
 from rebody.cli.output import check_output
 from rebody.errors import RebodyError
 from rebody.report.page import EXPECTED, find, write_page
+from rebody.tasks.family_file import read_families
 
 
 @dataclass(frozen=True)
@@ -20,12 +21,15 @@ class Report:
     figures and videos (such as demo)."""
     out: Path = Path("report.html")
     """Where the page goes."""
+    families: Path | None = None
+    """File of your own families, where results are of any with a reward law of your own."""
 
     def run(self) -> None:
         """Read all, write the page, say where it is."""
         if not self.runs:
             raise RebodyError(f"there is nothing to report. {EXPECTED}")
         check_output(self.out, "--out", (".html",), inputs=self.runs)
+        read_families(self.families)  # results may name its laws
         console = Console(soft_wrap=True)
         with console.status("reading"):
             found = [find(reference) for reference in self.runs]

@@ -13,8 +13,9 @@ from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate
 from rebody.evaluation.episode import EpisodeResult
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.report import film, plot_episode
+from rebody.report.page.tables import vector
 from rebody.tasks.task_file import TaskSpec, parse_task
 
 
@@ -23,7 +24,7 @@ class RunTask:
     """Run one episode on a hidden task; say how it went, draw it, film it."""
 
     task: str
-    """FAMILY=TARGET, such as goal=-9."""
+    """FAMILY=TARGET, such as goal=-9, or place=3,-2 where a target has several numbers."""
     video: Path | None = None
     """Where an MP4 goes."""
     figure: Path | None = None
@@ -34,8 +35,8 @@ class RunTask:
         """Run the episode and print its end."""
         check_output(self.figure, "--figure", PICTURES)
         check_output(self.video, "--video", (".mp4",))
-        spec = parse_task(self.task)
         trial = self.trial.load()
+        spec = parse_task(self.task, trial.in_play)
         if self.video is not None and trial.robot is None:
             raise RebodyError("there is no video of a point mass; use --figure.")
         episode = evaluate(trial, [spec], 1).episodes[0] if self.video is None else shoot(trial, spec, self.video)
@@ -54,7 +55,8 @@ def shoot(trial: Trial, spec: TaskSpec, path: Path) -> EpisodeResult:
 def describe(episode: EpisodeResult) -> str:
     """One line about how it ended."""
     fell = ", fell" if episode.fell else ""
+    hidden, read = vector(episode.active_target[-1], "g"), vector(episode.inferred_target[-1], ".2f")
     return (
-        f"hidden {episode.active_family[-1]} {episode.active_target[-1]:g}: "
-        f"read from the belief {episode.inferred_target[-1]:.2f}, final error {episode.final_error:.3f}{fell}"
+        f"hidden {episode.active_family[-1]} {hidden}: "
+        f"read from the belief {read}, final error {episode.final_error:.3f}{fell}"
     )

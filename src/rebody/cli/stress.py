@@ -1,6 +1,7 @@
 """`rebody stress`."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from rich.console import Console
 
@@ -9,6 +10,7 @@ from rebody.agents.parts import load_tracker
 from rebody.bodies import load_robot
 from rebody.evaluation.stress import CHANGE_S, PUSH, PUSH_S, SECONDS, stress
 from rebody.ranges import Episodes, Seed
+from rebody.tasks.family_file import read_families
 
 
 @dataclass(frozen=True)
@@ -19,6 +21,8 @@ class Stress:
     """A robot's name (see `rebody list`), or the path of its TOML file."""
     tracker: str | None = None
     """Tracker artifact; default tracker-ROBOT."""
+    families: Path | None = None
+    """File of your own families, where the tracker knows any with a reward law of your own."""
     episodes: Episodes = 1000
     """How many times."""
     seed: Seed = 0
@@ -26,6 +30,7 @@ class Stress:
 
     def run(self) -> None:
         """Run them all at once, print what share fell."""
+        read_families(self.families)  # artifacts may name its laws
         spec = load_robot(self.robot)
         loaded = load_tracker(f"tracker-{spec.name}" if self.tracker is None else self.tracker)
         check_robot_of(loaded, spec)

@@ -1,7 +1,7 @@
 """`rebody train`: every shipped artifact is made by these commands."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, make_dataclass
+from dataclasses import dataclass, field, make_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,9 +10,12 @@ from rich.console import Console
 
 from rebody.bodies import load_robot, shipped_robots
 from rebody.cli.commands import subcommands
+from rebody.control.command import commands_within
 from rebody.errors import RebodyError, unknown
 from rebody.names import presets
-from rebody.ranges import Seed
+from rebody.ranges import Seed, interval
+from rebody.tasks import SHIPPED
+from rebody.tasks.family_file import read_families
 from rebody.training.classifier import ClassifierConfig, train_classifier
 from rebody.training.flat import FlatConfig, train_flat
 from rebody.training.high_level import HighLevelConfig, train_high_level
@@ -72,11 +75,16 @@ class TrainTracker:
 
     robot: Named
     config: Annotated[TrackerConfig, FLAT]
+    reach: dict[str, tuple[float, float]] = field(default_factory=dict)
+    """Ranges of families of one number, beside those of the robot's file or in their place: jump 0.5 3.0."""
     options: Start = field(default_factory=StartOptions)
 
     def run(self) -> None:
-        """Train, save, say where."""
-        _show_card(train_tracker(self.robot, self.config, **vars(self.options)))
+        """Train, save, say where; families of a file are asked of the robot as far as its reach names them."""
+        own = {name: interval(*ends) for name, ends in self.reach.items()}
+        reach = tuple((dict(load_robot(self.robot).reach) | own).items())
+        families = commands_within(reach, self.config.families.beside(SHIPPED))
+        _show_card(train_tracker(self.robot, replace(self.config, families=families), **vars(self.options)))
 
 
 @dataclass(frozen=True)
@@ -87,11 +95,14 @@ class TrainFlat:
     """A robot's name (see `rebody list`), or the path of its TOML file."""
     inference: str = "position"
     """Inference artifact: a shipped name or a folder."""
+    families: Path | None = None
+    """File of your own families, where the module knows any with a reward law of your own."""
     options: Start = field(default_factory=StartOptions)
     config: Annotated[FlatConfig, FLAT] = field(default_factory=FlatConfig)
 
     def run(self) -> None:
         """Train, save, say where."""
+        read_families(self.families)  # artifacts may name its laws
         _show_card(train_flat(self.robot, self.inference, self.config, **vars(self.options)))
 
 
@@ -119,11 +130,14 @@ class TrainHighLevel:
     """Inference artifact: a shipped name or a folder."""
     tracker: str | None = None
     """Tracker artifact; default tracker-ROBOT."""
+    families: Path | None = None
+    """File of your own families, where the module knows any with a reward law of your own."""
     options: Start = field(default_factory=StartOptions)
     config: Annotated[HighLevelConfig, FLAT] = field(default_factory=HighLevelConfig)
 
     def run(self) -> None:
         """Train, save, say where."""
+        read_families(self.families)  # artifacts may name its laws
         _show_card(train_high_level(self.robot, self.inference, self.tracker, self.config, **vars(self.options)))
 
 
@@ -135,11 +149,14 @@ class TrainStepPredictor:
     """A robot's name (see `rebody list`), or the path of its TOML file."""
     tracker: str | None = None
     """Tracker artifact; default tracker-ROBOT."""
+    families: Path | None = None
+    """File of your own families, where the tracker knows any with a reward law of your own."""
     options: Start = field(default_factory=StartOptions)
     config: Annotated[StepPredictorConfig, FLAT] = field(default_factory=StepPredictorConfig)
 
     def run(self) -> None:
         """Train, save, say where."""
+        read_families(self.families)  # artifacts may name its laws
         _show_card(train_step_predictor(self.robot, self.tracker, self.config, **vars(self.options)))
 
 
@@ -149,11 +166,14 @@ class TrainClassifier:
 
     inference: str = "goal-velocity"
     """Inference artifact: a shipped name or a folder."""
+    families: Path | None = None
+    """File of your own families, where the module knows any with a reward law of your own."""
     options: Run = field(default_factory=RunOptions)
     config: Annotated[ClassifierConfig, FLAT] = field(default_factory=ClassifierConfig)
 
     def run(self) -> None:
         """Train, save, say where."""
+        read_families(self.families)  # artifacts may name its laws
         _show_card(train_classifier(self.inference, self.config, **vars(self.options)))
 
 
@@ -169,7 +189,8 @@ def train_command(arguments: Sequence[str]) -> type:
     )
     robots |= {} if own is None or own in robots else {own: "The tracker of your own robot."}
     of_preset = {name: TrainInference(name, preset()) for name, preset in PRESETS.items()}
-    of_robot = {name: TrainTracker(name, tracker_preset(load_robot(name))) for name in robots}
+    known = read_families(_value_of("--families", arguments))
+    of_robot = {name: TrainTracker(name, tracker_preset(load_robot(name), known)) for name in robots}
     parts = {
         "inference": _one_of(of_preset, TrainInference.__doc__, presets()),
         "tracker": _one_of(of_robot, f"{TrainTracker.__doc__} Your own: the path of its TOML file.", robots),
@@ -198,6 +219,13 @@ def _word_behind(part: str, what: str, known: dict[str, str], arguments: Sequenc
         lines = "".join(f"\n  {name}: {line}" for name, line in known.items())
         raise RebodyError(f"write `rebody train {part} {what} --out DIR`, where {what} is one of{lines}")
     return word
+
+
+def _value_of(option: str, arguments: Sequence[str]) -> Path | None:
+    """What is behind an option, or behind its equals sign, that is read before tyro reads all."""
+    words = [word for each in arguments for word in (each.split("=", 1) if each.startswith(option) else [each])]
+    behind = words[words.index(option) + 1 :] if option in words else []
+    return Path(behind[0]) if behind else None
 
 
 def _show_card(folder: Path) -> None:

@@ -19,9 +19,10 @@ from rebody.agents.parts import (
 )
 from rebody.bodies import load_robot
 from rebody.errors import RebodyError
-from rebody.evaluation.evaluate import POINT_MASS, Trial
+from rebody.evaluation.trial import POINT_MASS, Trial
 from rebody.names import AGENTS
 from rebody.ranges import Count, Decisions, Seconds
+from rebody.tasks.family_file import read_families
 
 AGENT_HELP = "; ".join(f"{name}: {what}" for name, what in AGENTS.items())
 
@@ -58,10 +59,13 @@ class TrialOptions:
     """Decisions that `reuse` looks ahead; default 15, in thesis mode 1."""
     thesis: bool = False
     """Thesis mode (6.3.3): the module hears of the world once per stride only."""
+    families: Path | None = None
+    """File of your own families, TOML or Python."""
 
     def load(self) -> Trial:
         """Load the parts; RebodyError where an option makes no sense or a part cannot be had."""
         check_agent(self.agent)
+        families = read_families(self.families)  # first: artifacts may name its laws
         inference, robot, parts = load_inference(self.inference), None, {}
         if self.robot != POINT_MASS:
             robot = load_robot(self.robot)
@@ -70,6 +74,7 @@ class TrialOptions:
             agent=self.agent,
             robot=robot,
             inference=inference,
+            families=families,
             slots_by=self.slots_by,
             seconds=self.seconds,
             stride=self._fixed_stride(),

@@ -1,6 +1,7 @@
 """`rebody view`: the live page."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -9,7 +10,7 @@ from rich.console import Console
 from rebody.bodies import shipped_robots
 from rebody.cli.trial import AGENT_HELP, TrialOptions
 from rebody.errors import RebodyError
-from rebody.evaluation.evaluate import POINT_MASS, Trial, check_trial
+from rebody.evaluation.trial import POINT_MASS, Trial, check_trial
 from rebody.ranges import Port
 from rebody.store import shipped_artifacts
 from rebody.tasks.task_file import parse_task
@@ -35,6 +36,8 @@ class View:
     """Flat policy of that robot and module; default flat-INFERENCE-ROBOT."""
     classifier: str | None = None
     """Classifier of that module; default classifier-INFERENCE."""
+    families: Path | None = None
+    """File of your own families, TOML or Python."""
     port: Port = 8080
     """Where on this machine the page is; 0 for any free port."""
 
@@ -48,8 +51,9 @@ class View:
             if error.name not in ("viser", "mjviser"):
                 raise
             raise RebodyError("the live page needs more packages: install with `pip install 'rebody[view]'`.") from None
-        choice, task = Choice(self.robot, self.inference, self.agent), parse_task(self.task)
+        choice = Choice(self.robot, self.inference, self.agent)
         trial = self._load(choice)
+        task = parse_task(self.task, trial.in_play)
         check_trial(trial, [task])
         modules = [name for name, kind in shipped_artifacts() if kind == "inference"]
         offered = Offered(_with([POINT_MASS, *shipped_robots()], self.robot), _with(modules, self.inference))
@@ -68,6 +72,7 @@ class View:
             tracker=self.tracker if of_robot else None,
             flat=self.flat if of_robot and of_module else None,
             classifier=self.classifier if of_module else None,
+            families=self.families,
         ).load()
 
 

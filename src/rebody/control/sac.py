@@ -132,7 +132,7 @@ class Critics(eqx.Module):
         return jnp.stack([self.first(x)[..., 0], self.second(x)[..., 0]])
 
 
-Judge = Callable[
+ActionValue = Callable[
     [
         Critics,
         Float[AnyArray, "*batch observation"],
@@ -145,13 +145,13 @@ Judge = Callable[
 more doubtful critic, and its log-probability."""
 
 
-def whole(
+def value_of_action(
     critics: Critics,
     observation: Float[AnyArray, "*batch observation"],
     action: Float[AnyArray, "*batch action"],
     log_probs: Float[AnyArray, "*batch action"],
 ) -> tuple[Float[AnyArray, "*batch"], Float[AnyArray, "*batch"]]:
-    """The judge of an actor whose action is done as it is."""
+    """The action value of an actor whose action is done as it is."""
     return critics(observation, action).min(0), log_probs.sum(-1)
 
 
@@ -188,15 +188,15 @@ def initial_state(observations: int, actions: int, config: SACConfig, key: PRNGK
 
 
 def update(
-    state: SACState, batch: SACBatch, key: PRNGKeyArray, config: SACConfig, judge: Judge = whole
+    state: SACState, batch: SACBatch, key: PRNGKeyArray, config: SACConfig, action_value: ActionValue = value_of_action
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """One step of critics, actor and temperature, then of the two moving averages.
 
-    With another `judge` an actor may say more than what is done in the end, which is what `batch.action` holds.
+    With another `action_value` an actor may say more than what is done in the end, which is what `batch.action` holds.
     """
     critic_key, actor_key = jax.random.split(key)
-    state, critic_metrics = _update_critics(state, batch, critic_key, config, judge)
-    state, actor_metrics = _update_actor(state, batch, actor_key, config, judge)
+    state, critic_metrics = _update_critics(state, batch, critic_key, config, action_value)
+    state, actor_metrics = _update_actor(state, batch, actor_key, config, action_value)
     state, temperature_metrics = _update_temperature(state, actor_metrics["entropy"], batch, config)
     state = _update_averages(state, config)
     return state, critic_metrics | actor_metrics | temperature_metrics
@@ -208,7 +208,7 @@ def update_many(
     inputs: Any,
     keys: Key[AnyArray, " update"],
     config: SACConfig,
-    judge: Judge = whole,
+    action_value: ActionValue = value_of_action,
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """An update per key in one scan; `batch_of` makes its batch from one entry of `inputs` and a key.
 
@@ -219,7 +219,9 @@ def update_many(
     def step(arrays, inputs):
         inputs, key = inputs
         batch_key, update_key = jax.random.split(key)
-        updated, metrics = update(eqx.combine(arrays, static), batch_of(inputs, batch_key), update_key, config, judge)
+        updated, metrics = update(
+            eqx.combine(arrays, static), batch_of(inputs, batch_key), update_key, config, action_value
+        )
         return eqx.filter(updated, eqx.is_array), metrics
 
     arrays, metrics = jax.lax.scan(step, arrays, (inputs, keys))
@@ -233,10 +235,10 @@ def take_over(state: SACState, actor: Actor, name: str) -> SACState:
     return eqx.tree_at(lambda s: (s.actor, s.averaged_actor), state, (actor, actor))
 
 
-def _update_critics(state, batch, key, config, judge):
+def _update_critics(state, batch, key, config, action_value):
     """Soft Bellman error against the smaller of the two target critics (thesis 2.14, 2.15)."""
     sampled = state.actor.sample(batch.next_observation, key)
-    next_value, next_log_prob = judge(state.target_critics, batch.next_observation, *sampled)
+    next_value, next_log_prob = action_value(state.target_critics, batch.next_observation, *sampled)
     next_value = next_value - jnp.exp(state.log_temperature) * next_log_prob
     target = batch.reward + config.discount * (1 - batch.terminal) * next_value
 
@@ -250,11 +252,11 @@ def _update_critics(state, batch, key, config, judge):
     return state, {"critic_loss": value, "value": values.mean()}
 
 
-def _update_actor(state, batch, key, config, judge):
+def _update_actor(state, batch, key, config, action_value):
     """KL between the policy and the softmax of the critics (thesis 2.16, 2.17)."""
 
     def loss(actor):
-        value, log_prob = judge(state.critics, batch.observation, *actor.sample(batch.observation, key))
+        value, log_prob = action_value(state.critics, batch.observation, *actor.sample(batch.observation, key))
         return jnp.mean(jnp.exp(state.log_temperature) * log_prob - value), -log_prob.mean()
 
     (value, entropy), gradient = eqx.filter_value_and_grad(loss, has_aux=True)(state.actor)

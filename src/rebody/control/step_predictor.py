@@ -4,10 +4,12 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float, Int
 
-from rebody.bodies.robot import Reach
+from rebody.control.command import Command
 from rebody.control.sac import Actor
-from rebody.control.tracker import Command, tracker_observation
-from rebody.tasks.families import GOAL, VELOCITY
+from rebody.control.tracker import tracker_observation
+from rebody.tasks.family import Family
+from rebody.tasks.family_set import FamilySet
+from rebody.tasks.quantities import length
 from rebody.types import AnyArray
 
 MOST_STEPS = 20
@@ -17,19 +19,22 @@ SMALLEST_SUBGOAL = 0.05
 """Errors are relative to the subgoal, but never to less than this [m, m/s]: at a goal it is nothing."""
 STEP_COST = 0.1
 """Paid for every control step."""
-SLOTS = (GOAL, VELOCITY)
-"""What its subgoals may be about: positions and speeds, as in the thesis."""
+
+
+def is_predictable(family: Family) -> bool:
+    """Whether it knows subgoals of a family: positions and speeds along x, as in the thesis."""
+    return family.quantity.components in (("x",), ("vx",))
 
 
 class StepPredictor(eqx.Module):
     """A policy of one number for one tracker, with that tracker's fixed input scaling."""
 
     actor: Actor
-    reach: Reach = eqx.field(static=True)
+    families: FamilySet = eqx.field(static=True)
 
     def __call__(self, joints: Float[AnyArray, "*batch joint"], command: Command) -> Int[AnyArray, "*batch"]:
         """Control steps, from 1 to `MOST_STEPS`, that the command as the robot sees it now will take."""
-        return steps_of(self.actor(tracker_observation(joints, command, self.reach)))
+        return steps_of(self.actor(tracker_observation(joints, command, self.families)))
 
 
 def steps_of(action: Float[AnyArray, "*batch 1"]) -> Int[AnyArray, "*batch"]:
@@ -39,11 +44,11 @@ def steps_of(action: Float[AnyArray, "*batch 1"]) -> Int[AnyArray, "*batch"]:
 
 
 def step_reward(
-    command: Command, error: Float[AnyArray, "*batch"], steps: Int[AnyArray, "*batch"]
+    command: Command, error: Float[AnyArray, "*batch axis"], steps: Int[AnyArray, "*batch"]
 ) -> Float[AnyArray, "*batch"]:
     """Pay for holding a command for so many control steps that ended this far from it [m, m/s].
 
     -|error| / |subgoal| - 0.1 per step, within [-2, 1] (thesis 6.4.3: the negative distance to the subgoal).
     """
-    missed = jnp.abs(error) / jnp.maximum(jnp.abs(command.value), SMALLEST_SUBGOAL)
+    missed = length(error) / jnp.maximum(length(command.value), SMALLEST_SUBGOAL)
     return jnp.clip(-missed - STEP_COST * steps, LOWEST_REWARD, HIGHEST_REWARD)

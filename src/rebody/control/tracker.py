@@ -1,44 +1,30 @@
-"""The tracker ("transfer function" in the thesis, 5.5): (joint state, subgoal) -> joint action.
+"""The tracker ("transfer function" in the thesis, 5.5): (joint state, command) -> joint action.
 
-A command is the subgoal as the robot sees it: a goal or a pitch relative to where the robot is now, cut to what it
-was trained for, or a speed. One network serves all slots (5.6).
+One network serves all slots (5.6): the families of what it can be commanded to do, each with the range that it was
+trained for as its targets.
 """
 
 from dataclasses import dataclass
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
-from rebody.bodies.robot import Reach
+from rebody.control.command import Command, Motion, after, of_rates, per_slot
 from rebody.control.sac import Actor
 from rebody.ranges import NotNegative
-from rebody.tasks.families import GOAL, JUMP, STAND, family_index
-from rebody.types import AnyArray, Subgoal
+from rebody.tasks.family import Family
+from rebody.tasks.family_set import FamilySet
+from rebody.tasks.quantities import length
+from rebody.types import ANGLES, POSE_FIELDS, RATE_OF, AnyArray
 
 MARGIN = 1.1
 """Trackers are trained on commands that go beyond a robot's reach by this factor, and cut farther ones to it."""
-LOWEST_JUMP = 0.5
-"""Slowest jump that is paid in full [m/s]; one of 0 is none."""
-
-
-class Command(eqx.Module):
-    """A subgoal relative to the robot."""
-
-    slot: Int[AnyArray, "*batch"]  # index into `rebody.tasks.FAMILIES`
-    value: Float[AnyArray, "*batch"]  # goal: m ahead of the robot; velocity, jump: m/s; stand: rad to turn
-
-
-class Motion(eqx.Module):
-    """What a control step did to the robot."""
-
-    displacement: Float[AnyArray, "*batch"]  # m
-    turn: Float[AnyArray, "*batch"]  # rad
-    pitch: Float[AnyArray, "*batch"]  # rad, afterwards
-    pace: Float[AnyArray, "*batch"]  # m/s, afterwards: the speed of this step, or a mean over the last ones
-    fell: Bool[AnyArray, "*batch"]
-    rise: Float[AnyArray, "*batch"]  # m
+SLOWEST = 0.5
+"""Slowest jump that is paid in full, and least speed that errors are relative to [m/s]."""
+ROLL, PITCH = POSE_FIELDS.index("roll"), POSE_FIELDS.index("pitch")
 
 
 @dataclass(frozen=True)
@@ -71,59 +57,44 @@ class Tracker(eqx.Module):
     """A policy for one robot, with its fixed input scaling."""
 
     actor: Actor
-    reach: Reach = eqx.field(static=True)
+    families: FamilySet = eqx.field(static=True)
+    """What a command can ask for, and how much of it."""
 
     @property
     def joints(self) -> int:
         """Size of the joint state that it sees."""
-        nothing = Command(np.zeros((), np.int32), np.zeros((), np.float32))
-        return self.actor.observations - tracker_observation(np.zeros(0, np.float32), nothing, self.reach).size
-
-    @property
-    def slots(self) -> tuple[str, ...]:
-        """Families that a command can address."""
-        return slots_of(self.reach)
+        return self.actor.observations - command_inputs(self.families)
 
     def __call__(self, joints: Float[AnyArray, "*batch joint"], command: Command) -> Float[AnyArray, "*batch action"]:
         """Joint action in [-1, 1]."""
-        return self.actor(tracker_observation(joints, command, self.reach))
+        return self.actor(tracker_observation(joints, command, self.families))
 
 
-def slots_of(reach: Reach) -> tuple[str, ...]:
-    """Families that a robot of that reach can be commanded in, by index."""
-    return tuple(reach.limits)
-
-
-def relative(subgoal: Subgoal, x: Float[AnyArray, "*batch"], pitch: Float[AnyArray, "*batch"]) -> Command:
-    """A subgoal as the robot sees it now: a goal is a point in the world, so its distance shrinks [m, rad]."""
-    return Command(subgoal.slot, jnp.subtract(subgoal.value, of_slot(subgoal.slot, x, pitch)))
-
-
-def after(command: Command, motion: Motion) -> Command:
-    """The same subgoal as it is seen after a motion."""
-    return Command(command.slot, jnp.subtract(command.value, of_slot(command.slot, motion.displacement, motion.turn)))
-
-
-def of_slot(slot: Int[AnyArray, "*batch"], x: Float[AnyArray, "*batch"], pitch: Float[AnyArray, "*batch"]):
-    """What a slot is about, [*batch]: x [m] for goals, pitch [rad] for stands, else 0; of NumPy or JAX."""
-    return (slot == GOAL) * x + (slot == STAND) * pitch
+def command_inputs(families: FamilySet) -> int:
+    """How many numbers of a tracker's observation are its command."""
+    nothing = Command(np.zeros((), np.int32), np.zeros(families.size, np.float32))
+    return jax.eval_shape(lambda: tracker_observation(jnp.zeros(0), nothing, families)).size
 
 
 def tracker_observation(
-    joints: Float[AnyArray, "*batch joint"], command: Command, reach: Reach
+    joints: Float[AnyArray, "*batch joint"], command: Command, families: FamilySet
 ) -> Float[AnyArray, "*batch feature"]:
     """Joint state and command, what is to be reached on three scales so that centimetres count as metres do."""
-    far, (slowest, fastest) = MARGIN * reach.distance, (MARGIN * limit for limit in reach.speed)
-    is_slot = {name: (command.slot == family_index(name)).astype(joints.dtype) for name in slots_of(reach)}
-    ahead = is_slot["goal"] * jnp.clip(command.value, -far, far)
-    speed = is_slot["velocity"] * jnp.clip(command.value, slowest, fastest)
-    features = [*is_slot.values(), ahead / far, jnp.tanh(2 * ahead), jnp.tanh(10 * ahead), speed]
-    if reach.pitch is not None:
-        turn = is_slot["stand"] * command.value
-        features += [turn, jnp.tanh(2 * turn), jnp.tanh(10 * turn)]
-    if reach.jump is not None:
-        features.append(is_slot["jump"] * jnp.clip(command.value, 0.0, MARGIN * reach.jump[1]))
+    is_slot = [jnp.asarray(command.slot == i, joints.dtype) for i in range(len(families))]
+    features = [*is_slot]
+    for here, family in zip(is_slot, families, strict=True):
+        for i, name in enumerate(family.quantity.components):
+            features += _seen(name, here, command.value[..., i], family.range.low[i], family.range.high[i])
     return jnp.concatenate([joints, jnp.stack(features, axis=-1)], axis=-1)
+
+
+def _seen(component: str, is_slot, value, low: float, high: float) -> list[Float[AnyArray, "*batch"]]:
+    """One number of a command, 0 in all slots but its own."""
+    if component in RATE_OF:
+        return [is_slot * jnp.clip(value, min(0.0, MARGIN * low), max(0.0, MARGIN * high))]
+    far = 1.0 if component in ANGLES else MARGIN * max(abs(low), abs(high))
+    left = is_slot * (value if component in ANGLES else jnp.clip(value, -far, far))
+    return [left / far, jnp.tanh(2 * left), jnp.tanh(10 * left)]
 
 
 def tracker_reward(
@@ -131,7 +102,7 @@ def tracker_reward(
     motion: Motion,
     control_dt: float,
     action: Float[AnyArray, "*batch action"],
-    reach: Reach,
+    families: FamilySet,
     weights: TrackerReward,
 ) -> Float[AnyArray, "*batch"]:
     """Pay for one control step of `control_dt` seconds.
@@ -139,25 +110,58 @@ def tracker_reward(
     Linear in the error, absolute or relative, so that standing still is never the best answer to a speed; a pull on
     arrival.
     """
-    left = after(command, motion).value
-    miss = jnp.abs(left)
-    is_goal, is_stand, is_jump = (command.slot == slot for slot in (GOAL, STAND, JUMP))
-    arrival = weights.arrival * 0.1 / (0.1 + miss)
-    if weights.relative:
-        slowest, fastest = reach.speed
-        wanted = jnp.where(is_goal, jnp.clip(1.5 * left, slowest, fastest), command.value)
-        speed = jnp.where(is_goal, motion.displacement / control_dt, motion.pace)
-        relative_error = jnp.abs(wanted - speed) / jnp.maximum(jnp.abs(wanted), 0.5)
-        moving = weights.relative * jnp.maximum(1 - relative_error, -0.5) + jnp.where(is_goal, arrival, 0.0)
-    else:
-        goal = arrival - weights.distance * miss
-        moving = jnp.where(is_goal, goal, -weights.speed * jnp.abs(command.value - motion.pace))
-    stand = arrival - weights.turn * miss
-    share = motion.rise / control_dt / jnp.maximum(command.value, LOWEST_JUMP)
-    wanted_at_all = jnp.clip(command.value / LOWEST_JUMP, 0.0, 1.0)
-    jump = wanted_at_all * jnp.clip(share, 0.0, 1.0) ** 2 - weights.overshoot * jnp.maximum(share - 1.0, 0.0)
-    moving = jnp.where(is_jump, jump, moving)
-    posture = jnp.where(is_stand, 0.0, weights.upright * (1 - jnp.cos(motion.pitch)))
-    posture = posture + weights.energy * jnp.mean(action**2, axis=-1)
-    alive = weights.alive * (1.0 - motion.fell)
-    return jnp.where(is_stand, stand, moving) - posture + alive
+    left = after(families, command, motion).value
+    tilt = 1 - jnp.cos(motion.pose[..., ROLL]) * jnp.cos(motion.pose[..., PITCH])
+    paid = []
+    for family in families:
+        own, asked = left[..., : family.size], command.value[..., : family.size]
+        posture = 0.0 if _asks_for_attitude(family) else weights.upright * tilt
+        paid.append(_pay(family, families, asked, own, motion, control_dt, weights) - posture)
+    energy = weights.energy * jnp.mean(action**2, axis=-1)
+    return per_slot(paid, command.slot) - energy + weights.alive * (1.0 - motion.fell)
+
+
+def _pay(family: Family, families: FamilySet, asked, left, motion: Motion, control_dt: float, weights: TrackerReward):
+    """What the slot itself is worth."""
+    speed = of_rates(family, motion.displacement) / control_dt
+    if family.settle == "largest of 1 s":
+        return _pay_jump(asked, speed, weights)
+    if not family.is_pose:
+        return _pay_speed(asked, of_rates(family, motion.velocity), weights)
+    arrival = weights.arrival * 0.1 / (0.1 + length(left))
+    if weights.relative and not any(family.quantity.wraps):
+        slowest, fastest = _speeds(family, families)
+        return _pay_speed(jnp.clip(1.5 * left, slowest, fastest), speed, weights) + arrival
+    price = np.array([weights.turn if wraps else weights.distance for wraps in family.quantity.wraps], np.float32)
+    return arrival - length(price * left)
+
+
+def _pay_speed(wanted, speed, weights: TrackerReward):
+    miss = length(wanted - speed)
+    if not weights.relative:
+        return -weights.speed * miss
+    return weights.relative * jnp.maximum(1 - miss / jnp.maximum(length(wanted), SLOWEST), -0.5)
+
+
+def _pay_jump(asked, speed, weights: TrackerReward):
+    """By the share of the speed asked for, along its direction."""
+    size = length(asked)
+    along = speed[..., 0] if asked.shape[-1] == 1 else jnp.sum(speed * asked, axis=-1) / jnp.maximum(size, 1e-6)
+    share = along / jnp.maximum(size, SLOWEST)
+    wanted_at_all = jnp.clip(size / SLOWEST, 0.0, 1.0)
+    return wanted_at_all * jnp.clip(share, 0.0, 1.0) ** 2 - weights.overshoot * jnp.maximum(share - 1.0, 0.0)
+
+
+def _speeds(family: Family, families: FamilySet) -> tuple[np.ndarray, np.ndarray]:
+    """Between which speeds the robot moves along a place's components; any where no slot says so."""
+    low, high = np.full(family.size, -np.inf, np.float32), np.full(family.size, np.inf, np.float32)
+    for other in families:
+        for i, component in enumerate(other.quantity.components):
+            if RATE_OF.get(component) in family.quantity.components and other.settle != "largest of 1 s":
+                place = family.quantity.components.index(RATE_OF[component])
+                low[place], high[place] = other.range.low[i], other.range.high[i]
+    return low, high
+
+
+def _asks_for_attitude(family: Family) -> bool:
+    return bool({"pitch", "roll"} & set(family.quantity.components))

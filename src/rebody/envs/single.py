@@ -1,6 +1,5 @@
 """One body with a hidden task: a world of one."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -9,8 +8,7 @@ import numpy as np
 from rebody import inputs
 from rebody.bodies import Simulation
 from rebody.envs.seeds import body_seed
-from rebody.envs.world import DEFAULT_BASE_TASKS, World, task_of_options
-from rebody.tasks import BaseTask
+from rebody.envs.world import DEFAULT_FAMILIES, World, task_of_options
 
 
 class TaskEnv(gymnasium.Env):
@@ -20,12 +18,11 @@ class TaskEnv(gymnasium.Env):
         self,
         bodies: Simulation,
         *,
-        base_tasks: Sequence[BaseTask] = DEFAULT_BASE_TASKS,
-        reward: str = "plain",
+        families: Any = DEFAULT_FAMILIES,
         render_mode: str | None = None,
     ):
-        """Tasks are drawn from `base_tasks` unless `reset` is told one; `reward` is "plain" or "relative"."""
-        self._world = World(bodies, base_tasks, reward)
+        """Tasks are drawn from the targets of a `FamilySet` unless `reset` is told one; its laws say what is paid."""
+        self._world = World(bodies, families)
         self.render_mode = render_mode
         self.observation_space = self._world.observation_space
         self.action_space = self._world.action_space
@@ -35,7 +32,7 @@ class TaskEnv(gymnasium.Env):
 
         RebodyError, and nothing is reset, for other options or a seed that is none.
         """
-        task = task_of_options(options)
+        task = task_of_options(options, self._world.families)
         super().reset(seed=body_seed(seed))
         self._world.reset(0, self.np_random, task)
         return self._world.observations()[0], self._info()
@@ -58,4 +55,6 @@ class TaskEnv(gymnasium.Env):
         self._world.close()
 
     def _info(self) -> dict[str, Any]:
-        return {name: values.tolist()[0] for name, values in self._world.info().items()}
+        """Plain numbers; the target is an array, as long as the largest of the families has numbers."""
+        told = self._world.info()
+        return {name: values[0] if values.ndim > 1 else values.tolist()[0] for name, values in told.items()}

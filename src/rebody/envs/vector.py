@@ -1,7 +1,7 @@
 """Many bodies, each with a hidden task, stepped together."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,9 @@ from jaxtyping import Bool
 from rebody import inputs
 from rebody.bodies import Simulation
 from rebody.envs.seeds import body_seeds
-from rebody.envs.world import DEFAULT_BASE_TASKS, World, task_of_options
+from rebody.envs.world import DEFAULT_FAMILIES, World, task_of_options
 from rebody.errors import RebodyError
-from rebody.tasks import BaseTask
+from rebody.tasks import FamilySet
 from rebody.types import Task
 
 
@@ -27,12 +27,11 @@ class TaskVectorEnv(VectorEnv):
         bodies: Simulation,
         *,
         max_episode_steps: int | None = None,
-        base_tasks: Sequence[BaseTask] = DEFAULT_BASE_TASKS,
-        reward: str = "plain",
+        families: Any = DEFAULT_FAMILIES,
         render_mode: str | None = None,
     ):
         """As `TaskEnv`; episodes end after `max_episode_steps`, never where that is None."""
-        self._world = World(bodies, base_tasks, reward)
+        self._world = World(bodies, families)
         self._max_episode_steps = math.inf if max_episode_steps is None else max_episode_steps
         self._seeded = [seeding.np_random() for _ in range(bodies.size)]
         self._steps = np.zeros(bodies.size, np.int64)
@@ -60,7 +59,7 @@ class TaskVectorEnv(VectorEnv):
         An integer seeds body i with seed + i, a list has a seed of each body. `options` may name the task of all.
         RebodyError, and nothing is reset, for other options or seeds.
         """
-        chosen, task = _what_to_reset(options, self.num_envs)
+        chosen, task = _what_to_reset(options, self.num_envs, self._world.families)
         seeds = body_seeds(seed, self.num_envs)
         for body in np.flatnonzero(chosen):
             if seeds[body] is not None:
@@ -99,16 +98,17 @@ class TaskVectorEnv(VectorEnv):
         info: dict[str, Any] = {}
         for name, values in self._world.info().items():
             nothing: Any = None if values.dtype == object else 0
-            info[name] = np.where(told, values, nothing)
+            info[name] = np.where(told.reshape(-1, *[1] * (values.ndim - 1)), values, nothing)
             info[f"_{name}"] = told.copy()
         return info
 
 
-def _what_to_reset(options: Any, bodies: int) -> tuple[Bool[np.ndarray, " body"], Task | None]:
+def _what_to_reset(options: Any, bodies: int, families: FamilySet) -> tuple[Bool[np.ndarray, " body"], Task | None]:
     """Which bodies the options are about, and the task that they ask for; RebodyError where they are malformed."""
     if not isinstance(options, Mapping) or "reset_mask" not in options:
-        return np.ones(bodies, np.bool_), task_of_options(options)
+        return np.ones(bodies, np.bool_), task_of_options(options, families)
     mask = options["reset_mask"]
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (bodies,) or not mask.any():
         raise RebodyError(f"reset_mask must be a boolean array of shape ({bodies},) with a True in it, not {mask!r}.")
-    return mask.copy(), task_of_options({name: value for name, value in options.items() if name != "reset_mask"})
+    others = {name: value for name, value in options.items() if name != "reset_mask"}
+    return mask.copy(), task_of_options(others, families)

@@ -1,8 +1,8 @@
 """Bodies, each with a task that its observation does not show: what single and vector environments share."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
-from typing import Any, cast, get_args
+from typing import Any
 
 import jax
 import numpy as np
@@ -12,32 +12,34 @@ from jaxtyping import Float
 from rebody import inputs
 from rebody.bodies import Simulation
 from rebody.bodies.camera import Camera
-from rebody.errors import RebodyError, unknown
+from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
-from rebody.tasks import BaseTask, RewardForm, TaskDistribution, family_index, family_names, reward
+from rebody.ranges import interval
+from rebody.tasks import FamilySet
+from rebody.tasks.family_set import draw
+from rebody.tasks.line import GOAL, VELOCITY
 from rebody.types import GLOBAL_FIELDS, AnyArray, GlobalState, Task
 
-DEFAULT_BASE_TASKS = (
-    BaseTask("goal", 0.5, 10.0),
-    BaseTask("goal", -10.0, -0.5),
-    BaseTask("velocity", 1.0, 3.0),
-    BaseTask("velocity", -3.0, -1.0),
+DEFAULT_FAMILIES = FamilySet(
+    (
+        GOAL.within(interval(0.5, 10.0), interval(-10.0, -0.5), law="plain"),
+        VELOCITY.within(interval(1.0, 3.0), interval(-3.0, -1.0), law="plain"),
+    )
 )
-"""Goals [m] and velocities [m/s], forward and backward."""
+"""Goals [m] and velocities [m/s], forward and backward, paid by -|error|."""
 
 
 class World:
     """The bodies and tasks of one environment."""
 
-    def __init__(self, bodies: Simulation, base_tasks: Sequence[BaseTask], reward_form: str):
-        """RebodyError where there is no base task, an unknown family or an unknown form of the reward."""
-        if not base_tasks:
-            raise RebodyError("base_tasks is empty; give at least one BaseTask(family, low, high).")
+    def __init__(self, bodies: Simulation, families: Any):
+        """RebodyError where what is given is no set of families."""
+        if not isinstance(families, FamilySet):
+            raise RebodyError(f"families is {families!r}; give a rebody.tasks.FamilySet of at least one family.")
         self.bodies = bodies
-        self._tasks = TaskDistribution(tuple(base_tasks))
-        self._families = np.full(bodies.size, self._tasks.families[0], np.int32)
-        self._targets = np.zeros(bodies.size)
-        self._form = _form(reward_form)
+        self.families: FamilySet = families
+        self._family = np.zeros(bodies.size, np.int32)
+        self._target = np.zeros((bodies.size, families.size))
         self._begun = np.zeros(bodies.size, np.bool_)
         self._camera: Camera | None = None
 
@@ -57,8 +59,8 @@ class World:
 
     def reset(self, body: int, rng: np.random.Generator, task: Task | None = None) -> None:
         """Put one body at its start and give it that task, else a drawn one."""
-        task = self._tasks.draw(rng) if task is None else task
-        self._families[body], self._targets[body] = task.family, task.target
+        task = draw(self.families, rng) if task is None else task
+        self._family[body], self._target[body] = task.family, task.target
         self.bodies.reset(rng, np.arange(self.bodies.size) == body)
         self._begun[body] = True
 
@@ -75,15 +77,18 @@ class World:
     @own_jax_settings()
     def rewards(self) -> Float[np.ndarray, " body"]:
         """The tasks' rewards of the last step."""
-        task = Task(self._families, self._targets)
-        return np.asarray(_reward(task, self.bodies.observe(), self._form), np.float64)
+        task = Task(self._family, self._target)
+        return np.asarray(_reward(self.families, task, self.bodies.observe()), np.float64)
 
     def info(self) -> dict[str, np.ndarray]:
-        """Each body's task, which agents are not told, and its global state; arrays over bodies."""
-        names = np.array(family_names(), dtype=object)
+        """Each body's task, which agents are not told, and its global state; arrays over bodies.
+
+        Targets are [body, axis], with zeros behind those of a smaller family.
+        """
+        names = np.array(self.families.names, dtype=object)
         state = self.bodies.observe()
         values = {field: getattr(state, field).astype(np.float64) for field in GLOBAL_FIELDS}
-        return {"family": names[self._families], "target": self._targets.copy()} | values
+        return {"family": names[self._family], "target": self._target.copy()} | values
 
     def pictures(self) -> tuple[np.ndarray, ...]:
         """Every body, each [height, width, 3] of uint8."""
@@ -97,15 +102,15 @@ class World:
         self._camera = None
 
 
-@partial(jax.jit, static_argnames="form")
-def _reward(task: Task, state: GlobalState, form: RewardForm) -> Float[AnyArray, " body"]:
-    return reward(task, state, form)
+@partial(jax.jit, static_argnames="families")
+def _reward(families: FamilySet, task: Task, state: GlobalState) -> Float[AnyArray, " body"]:
+    return families.reward(task, state)
 
 
-def task_of_options(options: Any) -> Task | None:
+def task_of_options(options: Any, families: FamilySet) -> Task | None:
     """The task that `reset(options=...)` asks for, None where it asks for none.
 
-    RebodyError where it is not a family and a target.
+    RebodyError where it is not one of the families and a target, a number or as many as the family has.
     """
     if options is None:
         return None
@@ -120,12 +125,6 @@ def task_of_options(options: Any) -> Task | None:
             f"reset options are {', '.join(map(repr, options))}; give 'family' and 'target' together, "
             'as in options={"family": "goal", "target": -3.0}, or no options to have a task drawn.'
         )
-    family = family_index(str(options["family"]))
-    return Task(np.asarray(family), np.asarray(inputs.number(options["target"], "the target")))
-
-
-def _form(name: str) -> RewardForm:
-    known = get_args(RewardForm)
-    if name not in known:
-        raise unknown("reward", name, known)
-    return cast(RewardForm, name)
+    target = options["target"]
+    numbers = target if isinstance(target, list | tuple | np.ndarray) and np.ndim(target) == 1 else [target]
+    return families.task(str(options["family"]), [inputs.number(number, "the target") for number in numbers])

@@ -8,20 +8,19 @@ from jaxtyping import Bool
 
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.statistics import with_interval
-from rebody.tasks.figures import tolerance
 from rebody.types import DECISION_DT
 
 
 def summarise_changes(episodes: Sequence[EpisodeResult]) -> dict[str, Any] | None:
     """Medians [s] over the episodes whose base task changes, with 95 % intervals; None if there are none.
 
-    `noticed_s`: from the change until family and sign are read rightly. `recovered_s`: until the error is within
+    `noticed_s`: from the change until family and direction are read rightly. `recovered_s`: until the error is within
     tolerance. What never comes to pass counts as long as the episode lasted on.
     """
     changed = [episode for episode in episodes if _changes_base_task(episode)]
     if not changed:
         return None
-    noticed = [_first_s(episode, base_task_right(episode)) for episode in changed]
+    noticed = [_first_s(episode, episode.base_task_right()) for episode in changed]
     recovered = [_first_s(episode, _within_tolerance(episode)) for episode in changed]
     tasks = [episode.task for episode in changed]
     return {
@@ -31,15 +30,11 @@ def summarise_changes(episodes: Sequence[EpisodeResult]) -> dict[str, Any] | Non
     }
 
 
-def base_task_right(episode: EpisodeResult) -> Bool[np.ndarray, " time"]:
-    """Whether family and sign are read rightly from the belief after each decision."""
-    right_family = np.array(episode.inferred_family) == np.array(episode.active_family)
-    return right_family & (np.array(episode.inferred_target) * np.array(episode.active_target) > 0)
-
-
 def _changes_base_task(episode: EpisodeResult) -> bool:
-    changes_family = episode.active_family[0] != episode.active_family[-1]
-    return changes_family or episode.active_target[0] * episode.active_target[-1] < 0
+    if episode.active_family[0] != episode.active_family[-1]:
+        return True
+    first, last = episode.last_family.direction([episode.active_target[0], episode.active_target[-1]])
+    return bool(first != last)
 
 
 def _first_s(episode: EpisodeResult, holds: Bool[np.ndarray, " time"]) -> float:
@@ -51,4 +46,4 @@ def _first_s(episode: EpisodeResult, holds: Bool[np.ndarray, " time"]) -> float:
 
 
 def _within_tolerance(episode: EpisodeResult) -> Bool[np.ndarray, " time"]:
-    return episode.missed() <= tolerance(episode.active_family[-1])
+    return episode.missed() <= episode.last_family.tolerance

@@ -3,16 +3,19 @@
 from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from rich.table import Table
 
-from rebody.evaluation.changes import base_task_right
 from rebody.evaluation.episode import EpisodeResult
-from rebody.evaluation.evaluate import POINT_MASS, Trial, evaluate, take_yardsticks
+from rebody.evaluation.evaluate import evaluate, take_yardsticks
 from rebody.evaluation.results import Results
-from rebody.tasks import FAMILIES, Family, family_named
-from rebody.tasks.figures import LAST_S, tolerance
+from rebody.evaluation.trial import POINT_MASS, Trial
+from rebody.tasks import Family
+from rebody.tasks.family_set import fit
+from rebody.tasks.figures import LAST_S
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import DECISION_DT
 
@@ -70,17 +73,17 @@ class Diagnosis:
     @property
     def families(self) -> list[Family]:
         """Those of the tasks."""
-        return [family for family in FAMILIES if self.results["reuse"].of(family.name)]
+        return self.results["reuse"].families
 
     def culprits(self) -> Counter[str]:
         """How many episodes of `reuse` are out of tolerance by which part's fault."""
         episodes = self.results["reuse"].episodes
-        failed = [e for e in episodes if e.final_error > tolerance(e.active_family[-1])]
+        failed = [e for e in episodes if e.final_error > e.last_family.tolerance]
         return Counter(shares_of(episode).culprit for episode in failed)
 
     def base_task_known(self) -> float:
         """Share of episodes of `reuse` whose base task is read rightly once something is known."""
-        return float(np.mean([base_task_right(e)[SLOT_FROM - 1] for e in self.results["reuse"].episodes]))
+        return float(np.mean([e.base_task_right()[SLOT_FROM - 1] for e in self.results["reuse"].episodes]))
 
     def wrong_slots(self) -> float:
         """Share of decisions of `reuse` whose subgoal is in another slot than the task's, once something is known."""
@@ -117,24 +120,29 @@ def diagnoses_among(results: Iterable[Results]) -> list[Diagnosis]:
 
 def _conditions(results: Results) -> Hashable:
     """What agents of one ladder have in common."""
-    tasks = tuple((e.family, e.target, e.seed, str(e.switch), len(e.time_s)) for e in results.episodes)
+    tasks = tuple((e.task, e.seed, len(e.time_s)) for e in results.episodes)
     parts = (results.robot, results.inference, results.tracker, *sorted(results.frozen.values()))
     return parts, results.stride, results.horizon, tasks
 
 
 def shares_of(episode: EpisodeResult) -> Shares:
     """Means over the last 2 s; a velocity's are of its mean, so that a gait does not count."""
-    family, target = episode.active_family[-1], episode.active_target[-1]
-    difference = family_named(family).quantity.difference
-    read, reached = (float(np.mean(of[-_LAST:])) for of in (episode.inferred_target, episode.reached))
-    subgoal = np.mean([np.nan if value is None else value for value in episode.subgoal[-_LAST:]])
+    family, target = episode.last_family, np.array(episode.active_target[-1])
+    asked = [given or [np.nan] * family.size for given in episode.subgoal[-_LAST:]]
+    read, subgoal, reached = (_mean(of, family) for of in (episode.inferred_target[-_LAST:], asked, episode.reached))
+    distance = family.quantity.distance
     return Shares(
-        base_task_right=episode.inferred_family[-1] == family and read * target > 0,
-        slot_right=episode.subgoal_family[-1] == family,
-        read=float(abs(difference(read, target))),
-        high_level=float(abs(difference(subgoal, read))),
-        tracker=float(abs(difference(reached, subgoal))),
+        base_task_right=bool(episode.base_task_right()[-1]),
+        slot_right=episode.subgoal_family[-1] == family.name,
+        read=float(distance(read, target)),
+        high_level=float(distance(subgoal, read)),
+        tracker=float(distance(reached, subgoal)),
     )
+
+
+def _mean(vectors: Any, family: Family) -> Float[np.ndarray, " size"]:
+    """Of the last ones, those of another family's size cut or filled up."""
+    return np.mean([fit(np.array(vector), family.size) for vector in vectors[-_LAST:]], axis=0)
 
 
 def diagnosis_tables(diagnosis: Diagnosis) -> list[Table]:

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import jax
 import numpy as np
@@ -10,97 +10,27 @@ from jaxtyping import Float, Int
 
 from rebody.agents.agent import Agent
 from rebody.agents.build import (
-    HORIZON,
-    SlotsBy,
     build_agent,
-    check_agent,
-    check_module_of,
-    check_robot_of,
-    check_step_predictor,
-    check_tracker_of,
     slot_chooser,
 )
 from rebody.agents.clock import Clock, EvenClock, PredictedClock
 from rebody.agents.controller import Controller, FlatController, TrackerController
-from rebody.agents.fits import check_sizes
-from rebody.agents.kinds import KINDS
 from rebody.agents.parts import (
     Inference,
-    LoadedFlat,
-    LoadedHighLevel,
-    LoadedScratch,
-    LoadedSlots,
-    LoadedStepPredictor,
-    LoadedTracker,
 )
-from rebody.agents.rollout import Episodes, OnFrame, Starts, rollout_on_robot, rollout_on_toy
-from rebody.bodies import RobotSpec
-from rebody.bodies.toys import Toy
-from rebody.control.tracker import slots_of
+from rebody.agents.rollout import Episodes, Starts, rollout_on_robot, rollout_on_toy
+from rebody.control.command import slots_among
 from rebody.errors import RebodyError
 from rebody.evaluation.results import Results, episode_results
-from rebody.inference.contract import Contract
+from rebody.evaluation.trial import Trial, check_trial, without_slot
 from rebody.jax_settings import own_jax_settings
 from rebody.store import tree_hash
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT, Task
 
-POINT_MASS = "point-mass"
 MOST_DECISIONS = 1_000_000
 """Of all episodes of an evaluation together, 5,000 of 20 s: they are held in memory, and the slowest robot takes half
 an hour for them."""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """What is put to the test."""
-
-    agent: str
-    inference: Inference
-    robot: RobotSpec | None
-    """None for the point mass."""
-    tracker: LoadedTracker | None
-    flat: LoadedFlat | None = None
-    """The policy of agent `flat`."""
-    scratch: LoadedScratch | None = None
-    """All of agent `scratch`."""
-    high_level: LoadedHighLevel | None = None
-    """The policy of agent `retrain`."""
-    slots: LoadedSlots | None = None
-    """What chooses the slots of `reuse` on a robot, for a module of several families."""
-    slots_by: SlotsBy = "classifier"
-    toy: Toy | None = None
-    """A point mass other than the one that the module learned on."""
-    seconds: float = 20.0
-    stride: int = 1
-    """Decisions that a subgoal is held; in thesis mode control steps from one decision to the next."""
-    horizon: int = HORIZON
-    thesis: bool = False
-    """The encoder ticks once per stride (6.3.3)."""
-    step_predictor: LoadedStepPredictor | None = None
-    """In thesis mode it chooses each stride anew, in place of `stride` (6.4.3)."""
-    on_frame: OnFrame | None = None
-    """Called at every control step of a robot, to film it."""
-
-    @property
-    def robot_name(self) -> str:
-        """Name of the body."""
-        return POINT_MASS if self.robot is None else self.robot.name
-
-    @property
-    def contract(self) -> Contract:
-        """Of the module that believes: `scratch` brings its own."""
-        return self.scratch.contract if self.scratch else self.inference.contract
-
-    @property
-    def module_name(self) -> str:
-        """Of that module."""
-        return self.scratch.name if self.scratch else self.inference.name
-
-    @property
-    def decisions(self) -> int:
-        """Times 0.1 s of one episode."""
-        return round(self.seconds / DECISION_DT)
 
 
 @dataclass(frozen=True)
@@ -130,6 +60,7 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int, yardsticks: Yardst
     RebodyError where module, policies, tasks and robot do not fit together, or there is too much to do at once.
     """
     yardsticks = yardsticks or take_yardsticks(trial, specs, seeds)
+    trial = narrowed(trial, specs)
     check_trial(trial, specs)
     specs, episode_seeds, tasks = _episodes_of(trial, specs, seeds)
     agent = trial_agent(trial, tasks)
@@ -147,7 +78,10 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int, yardsticks: Yardst
         horizon=trial.horizon,
         thesis=trial.thesis,
         frozen=frozen,
-        episodes=episode_results(specs, episode_seeds, tasks, episodes, read, clusters, yardsticks.returns),
+        family_set=trial.in_play,
+        episodes=episode_results(
+            trial.in_play, specs, episode_seeds, tasks, episodes, read, clusters, yardsticks.returns
+        ),
     )
 
 
@@ -156,6 +90,7 @@ def take_yardsticks(trial: Trial, specs: list[TaskSpec], seeds: int) -> Yardstic
     """Oracle and idle in place of a trial's agent: none for a robot without a tracker, and no oracle where that has no
     slot for a task. RebodyError as `evaluate`.
     """
+    trial = narrowed(trial, specs)
     check_trial(trial, specs)
     _check_size(trial, len(specs) * seeds)
     if trial.robot is not None and trial.tracker is None:
@@ -167,7 +102,13 @@ def take_yardsticks(trial: Trial, specs: list[TaskSpec], seeds: int) -> Yardstic
         other = replace(trial, agent=agent, thesis=False, stride=stride, on_frame=None)
         return run_trial(other, trial_agent(other, tasks), tasks, starts)
 
-    return Yardsticks(None if _without_slot(trial, specs) else run("oracle"), run("idle"))
+    return Yardsticks(None if without_slot(trial, specs) else run("oracle"), run("idle"))
+
+
+def narrowed(trial: Trial, specs: list[TaskSpec]) -> Trial:
+    """The trial with the families that it takes, and no others, in play."""
+    asked = dict.fromkeys(family for spec in specs for family in spec.families)
+    return replace(trial, families=trial.in_play.only(tuple(asked)))
 
 
 def start_seeds(specs: list[TaskSpec], seeds: Int[np.ndarray, " episode"]) -> list[int]:
@@ -175,7 +116,7 @@ def start_seeds(specs: list[TaskSpec], seeds: Int[np.ndarray, " episode"]) -> li
 
     Were it the evaluation seed alone, all tasks of a seed would share one start, and be one sample of starts.
     """
-    texts = [json.dumps([asdict(spec), int(seed)]) for spec, seed in zip(specs, seeds, strict=True)]
+    texts = [json.dumps([spec.to_json(), int(seed)]) for spec, seed in zip(specs, seeds, strict=True)]
     return [int.from_bytes(hashlib.sha256(text.encode()).digest()[:8]) for text in texts]
 
 
@@ -185,7 +126,7 @@ def _episodes_of(
     """Task and evaluation seed of each episode, and the tasks that are active, [time, episode]."""
     specs = [spec for spec in specs for _ in range(seeds)]
     episode_seeds = np.tile(np.arange(seeds), len(specs) // seeds)
-    return specs, episode_seeds, active_tasks(specs, trial.decisions, DECISION_DT)
+    return specs, episode_seeds, active_tasks(specs, trial.in_play, trial.decisions, DECISION_DT)
 
 
 def frozen_hashes(inference: Inference) -> dict[str, str]:
@@ -203,6 +144,7 @@ def trial_agent(trial: Trial, tasks: Task) -> Agent:
         trial.agent,
         trial.inference,
         tasks,
+        families=trial.in_play,
         slots=slots,
         high_level=trial.high_level.policy if trial.high_level else None,
         scratch=trial.scratch.parts if trial.scratch else None,
@@ -213,12 +155,12 @@ def trial_agent(trial: Trial, tasks: Task) -> Agent:
 
 def run_trial(trial: Trial, agent: Agent, tasks: Task, starts: Starts) -> Episodes:
     """Episodes as arrays, 0.1 s apart; `tasks` are the active ones, [time, episode], `starts` seeds of the resets."""
-    form = trial.contract.reward
+    families = trial.in_play
     if trial.robot is None:
-        episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, form)
+        episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, families)
     else:
         clock, controller = _clock(trial), trial_controller(trial)
-        episodes = rollout_on_robot(agent, controller, trial.robot, tasks, form, starts, trial.on_frame, clock)
+        episodes = rollout_on_robot(agent, controller, trial.robot, tasks, families, starts, trial.on_frame, clock)
     return jax.tree.map(np.asarray, episodes)
 
 
@@ -234,7 +176,10 @@ def _clock(trial: Trial) -> Clock | None:
     """When the agent decides; None for our mode."""
     if not trial.thesis:
         return None
-    return PredictedClock(trial.step_predictor.predictor) if trial.step_predictor else EvenClock(trial.stride)
+    if trial.step_predictor is None:
+        return EvenClock(trial.stride)
+    predictor = trial.step_predictor.predictor
+    return PredictedClock(predictor, slots_among(trial.in_play, predictor.families))
 
 
 def trial_controller(trial: Trial) -> Controller:
@@ -247,57 +192,7 @@ def trial_controller(trial: Trial) -> Controller:
         return FlatController(trial.scratch.parts.policy, trial.scratch.parts.module.decoder)
     assert trial.tracker is not None
     assert trial.robot is not None
-    return TrackerController(trial.tracker.tracker, trial.robot.goal_ahead)
-
-
-def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
-    """RebodyError where module, policies, tasks and robot do not fit together."""
-    check_agent(trial.agent)
-    if trial.seconds < 3.0:
-        raise RebodyError(f"--seconds {trial.seconds:g} is too short: final errors need the last 2 s of at least 3.")
-    kind = KINDS[trial.agent]
-    if trial.thesis and not kind.in_thesis_mode:
-        able = [name for name, other in KINDS.items() if other.in_thesis_mode]
-        raise RebodyError(f"thesis mode is for the agents {', '.join(able)}, not for '{trial.agent}'.")
-    _check_tasks(trial, specs)
-    if trial.robot is None:
-        if trial.thesis and trial.stride > 1:
-            raise RebodyError("in thesis mode a stride counts control steps of a robot; a point mass has none.")
-        if kind.on_robots_alone:
-            raise RebodyError(f"agent '{trial.agent}' learned on a robot, and a point mass is none.")
-        return
-    slots = trial.tracker.tracker.slots if trial.tracker else slots_of(trial.robot.reach)
-    trial.contract.check_body(trial.robot.name, trial.robot.moving_fields, slots)
-    if trial.agent == "oracle" and (missing := _without_slot(trial, specs)):
-        # what the other agents are asked for, their module knows, and that fits the tracker
-        assert trial.tracker is not None
-        raise RebodyError(
-            f"agent 'oracle' is told {', '.join(missing)}, and tracker '{trial.tracker.name}' has no slot for that "
-            f"(it has {', '.join(slots)}). Choose tasks or a tracker that fit (rebody list)."
-        )
-    for part in (trial.tracker, trial.flat, trial.scratch, trial.high_level, trial.step_predictor):
-        if part is not None:
-            check_robot_of(part, trial.robot)
-    if trial.flat is not None:
-        check_module_of("flat policy", trial.flat, trial.inference)
-    if trial.high_level is not None:
-        assert trial.tracker is not None
-        check_module_of("high-level policy", trial.high_level, trial.inference)
-        check_tracker_of("high-level policy", trial.high_level, trial.tracker)
-    if trial.step_predictor is not None:
-        assert trial.tracker is not None
-        check_step_predictor(trial.step_predictor, trial.tracker, trial.inference)
-    for part in (trial.tracker, trial.flat, trial.scratch, trial.high_level):
-        if part is not None:
-            check_sizes(part, trial.robot, trial.inference.parts.module.encoder)
-
-
-def _without_slot(trial: Trial, specs: list[TaskSpec]) -> list[str]:
-    """Families of the tasks that a robot's tracker cannot be commanded in."""
-    if trial.tracker is None:
-        return []
-    asked = dict.fromkeys(family for spec in specs for family in (spec.family, spec.last.family))
-    return [family for family in asked if family not in trial.tracker.tracker.slots]
+    return TrackerController(trial.tracker.tracker, trial.in_play, trial.robot.goal_ahead)
 
 
 def _check_size(trial: Trial, episodes: int) -> None:
@@ -307,17 +202,3 @@ def _check_size(trial: Trial, episodes: int) -> None:
             f"{episodes:,} episodes of {trial.seconds:g} s cannot be evaluated at once: at most {most:,}, at least 1. "
             "Take fewer seeds, or split the task file."
         )
-
-
-def _check_tasks(trial: Trial, specs: list[TaskSpec]) -> None:
-    known = trial.contract.target_ranges
-    for spec in specs:
-        if spec.switch is not None and round(spec.switch.at_s / DECISION_DT) >= trial.decisions:
-            raise RebodyError(f"a switch at {spec.switch.at_s:g} s is not within an episode of {trial.seconds:g} s.")
-        for family in {spec.family, spec.last.family}:
-            # a robot's oracle and an idle one need no module
-            if family not in known and (trial.robot is None or trial.agent not in ("oracle", "idle")):
-                raise RebodyError(
-                    f"'{trial.module_name}' was trained on {', '.join(known)} and cannot infer '{family}'. "
-                    "Choose tasks or a module that fit (rebody list)."
-                )

@@ -13,7 +13,7 @@ from rebody.agents.rollout import Episodes
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.summary import summarise
 from rebody.store.files import written_whole
-from rebody.tasks import FAMILIES
+from rebody.tasks import Family, FamilySet
 from rebody.tasks.figures import final_error, final_squared_error, ripple
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import DECISION_DT, AnyArray, Task
@@ -35,6 +35,8 @@ class Results:
     thesis: bool
     frozen: dict[str, str]
     """SHA-256 of the inference module and of the toy's policy, the same before the episodes and after them."""
+    family_set: FamilySet
+    """The families in play: the module's, then others that were asked for."""
     episodes: list[EpisodeResult]
 
     def of(self, family: str) -> list[EpisodeResult]:
@@ -42,9 +44,10 @@ class Results:
         return [episode for episode in self.episodes if episode.active_family[-1] == family]
 
     @property
-    def families(self) -> list[str]:
-        """Names of those that episodes end with."""
-        return sorted({episode.active_family[-1] for episode in self.episodes})
+    def families(self) -> list[Family]:
+        """Those that episodes end with."""
+        ends = {episode.active_family[-1] for episode in self.episodes}
+        return [family for family in self.family_set if family.name in ends]
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -56,7 +59,8 @@ class Results:
         names = [field.name for field in fields(self) if field.name != "episodes"]
         return {
             "version": VERSION,
-            **{name: getattr(self, name) for name in names},
+            **{name: getattr(self, name) for name in names if name != "family_set"},
+            "families": [asdict(family) for family in self.family_set],
             "decision_dt": DECISION_DT,
             "episodes": [episode.to_json() for episode in self.episodes],
             "summary": self.summary,
@@ -70,42 +74,45 @@ def save_results(results: Results, path: Path) -> None:
 
 
 def episode_results(
+    families: FamilySet,
     specs: list[TaskSpec],
     seeds: Int[np.ndarray, " episode"],
     tasks: Task,
     episodes: Episodes,
-    read: tuple[Int[AnyArray, "time episode"], Float[AnyArray, "time episode"]],
+    read: tuple[Int[AnyArray, "time episode"], Float[AnyArray, "time episode axis"]],
     cluster: Int[np.ndarray, "time episode"],
     returns: dict[str, Float[np.ndarray, " episode"] | None],
 ) -> list[EpisodeResult]:
     """One result per episode, from arrays [time, episode]; `read` is what the probe says, `cluster` the mixture's
     component, `returns` has those of the oracle and of an idle agent where there are any.
     """
-    names = np.array([family.name for family in FAMILIES])
-    inferred_family, inferred_target = (np.asarray(part) for part in read)
-    state = episodes.state
-    last = Task(tasks.family[-1], tasks.target[-1])
-    errors, squared_errors, ripples = final_error(last, state), final_squared_error(last, state), ripple(state)
-    quantities = {family.quantity.name: family.quantity.read(state)[..., 0] for family in FAMILIES}
+    state, last = episodes.state, Task(tasks.family[-1], tasks.target[-1])
+    errors, ripples = final_error(families, last, state), ripple(state)
+    squared_errors = final_squared_error(families, last, state)
+    quantities = {family.quantity.name: np.asarray(family.quantity.read(state)) for family in families}
     results = []
     for i, spec in enumerate(specs):
+        active_family, active_target = _tasks(families, tasks.family[:, i], tasks.target[:, i])
+        inferred_family, inferred_target = _tasks(families, *(np.asarray(part)[:, i] for part in read))
+        subgoal_family, subgoal = _tasks(families, episodes.subgoal.slot[:, i], episodes.subgoal.value[:, i])
         results.append(
             EpisodeResult(
+                families=families,
                 family=spec.family,
-                target=spec.target,
+                target=list(spec.target),
                 seed=int(seeds[i]),
                 switch=None if spec.switch is None else asdict(spec.switch),
                 time_s=_floats(DECISION_DT * np.arange(1, len(state.x) + 1)),
-                quantities={quantity: _floats(values[:, i]) for quantity, values in quantities.items()},
+                quantities={name: _series(values[:, i]) for name, values in quantities.items()},
                 reward=_floats(episodes.reward[:, i]),
-                active_family=names[np.asarray(tasks.family[:, i])].tolist(),
-                active_target=_floats(tasks.target[:, i]),
-                inferred_family=names[inferred_family[:, i]].tolist(),
-                inferred_target=_floats(inferred_target[:, i]),
+                active_family=active_family,
+                active_target=active_target,
+                inferred_family=inferred_family,
+                inferred_target=inferred_target,
                 cluster=cluster[:, i].tolist(),
                 latent=[_floats(row) for row in episodes.belief.mean[:, i]],
-                subgoal_family=names[np.asarray(episodes.subgoal.slot[:, i])].tolist(),
-                subgoal=[None if np.isnan(value) else value for value in _floats(episodes.subgoal.value[:, i])],
+                subgoal_family=subgoal_family,
+                subgoal=[None if np.isnan(value).any() else value for value in subgoal],
                 fell=bool(episodes.fell[i]),
                 return_=float(np.sum(episodes.reward[:, i])),
                 oracle_return=_return_of(returns["oracle"], i),
@@ -116,6 +123,18 @@ def episode_results(
             )
         )
     return results
+
+
+def _tasks(families: FamilySet, family: Any, target: Any) -> tuple[list[str], list[list[float]]]:
+    """Names and targets, each as long as its family has it, over time."""
+    chosen = [families[index] for index in np.asarray(family)]
+    vectors = [_floats(vector[: each.size]) for each, vector in zip(chosen, np.asarray(target), strict=True)]
+    return [each.name for each in chosen], vectors
+
+
+def _series(values: Float[np.ndarray, "time size"]) -> list[Any]:
+    """Numbers where a quantity has one, else vectors."""
+    return _floats(values[:, 0]) if values.shape[1] == 1 else [_floats(row) for row in values]
 
 
 def _return_of(returns: Float[np.ndarray, " episode"] | None, episode: int) -> float | None:

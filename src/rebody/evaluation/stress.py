@@ -8,9 +8,10 @@ from jaxtyping import Bool, Int
 from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch, RobotSpec, Simulation
+from rebody.control.command import Command, absolute
+from rebody.control.places import UNBOUNDED
 from rebody.control.tracker import Tracker
-from rebody.tasks import GOAL, family_index
-from rebody.types import Subgoal
+from rebody.types import POSE_FIELDS, Subgoal
 
 SECONDS = 20.0
 CHANGE_S = (1.0, 5.0)
@@ -53,11 +54,11 @@ def stress(tracker: Tracker, spec: RobotSpec, episodes: int, seed: int = 0) -> S
     batch.reset(rng)
     subgoal, fell = _subgoals(tracker, batch, rng), np.zeros(episodes, bool)
     changes, pushes = (Countdown(rng, range_s, spec.control_dt, episodes) for range_s in (CHANGE_S, PUSH_S))
-    controller = TrackerController(tracker, spec.goal_ahead)
+    controller = TrackerController(tracker, None, spec.goal_ahead)
     for _ in range(round(SECONDS / spec.control_dt)):
         is_new, fresh = changes.due(), _subgoals(tracker, batch, rng)
         subgoal = Subgoal(
-            np.where(is_new, fresh.slot, subgoal.slot), np.where(is_new, fresh.value, subgoal.value).astype(np.float32)
+            np.where(is_new, fresh.slot, subgoal.slot), np.where(is_new[:, None], fresh.value, subgoal.value)
         )
         batch.push(np.where(pushes.due(), rng.choice([-PUSH, PUSH], episodes), 0.0))
         follow(controller, batch, subgoal)
@@ -67,9 +68,11 @@ def stress(tracker: Tracker, spec: RobotSpec, episodes: int, seed: int = 0) -> S
 
 def _subgoals(tracker: Tracker, batch: Simulation, rng: np.random.Generator) -> Subgoal:
     """One of each robot, within reach of where it is."""
-    limits, size = tracker.reach.limits, batch.size
-    values = np.stack([rng.uniform(*ends, size) for ends in limits.values()])
-    slots = np.array([family_index(name) for name in limits], np.int32)
-    which = rng.integers(len(slots), size=size)
-    slot, value = slots[which], values[which, np.arange(size)]
-    return Subgoal(slot, np.where(slot == GOAL, batch.pose()[:, 0] + value, value).astype(np.float32))
+    families = tracker.families
+    values = np.zeros((len(families), batch.size, families.size), np.float32)
+    for i, family in enumerate(families):
+        values[i, :, : family.size] = rng.uniform(family.range.low, family.range.high, (batch.size, family.size))
+    slot = rng.integers(len(families), size=batch.size)
+    # places and headings from where it is, all else as it stands
+    here = batch.pose().astype(np.float32) * np.isin(POSE_FIELDS, UNBOUNDED)
+    return absolute(families, Command(slot, values[slot, np.arange(batch.size)]), here)

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from rebody.evaluation.changes import base_task_right, summarise_changes
+from rebody.evaluation.changes import summarise_changes
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.statistics import percentile_95, regret, share_of_oracle, with_interval
-from rebody.tasks.figures import tolerance
 
 
 def summarise(episodes: Sequence[EpisodeResult]) -> dict[str, Any]:
@@ -24,22 +23,20 @@ def summarise(episodes: Sequence[EpisodeResult]) -> dict[str, Any]:
         "regret": _regret(episodes),
         "share": _share(episodes),
         "changes": summarise_changes(episodes),
-        "families": {
-            family: _of_family(family, [e for e in episodes if e.active_family[-1] == family]) for family in families
-        },
+        "families": {family: _of_family([e for e in episodes if e.active_family[-1] == family]) for family in families},
     }
 
 
-def _of_family(family: str, episodes: Sequence[EpisodeResult]) -> dict[str, Any]:
+def _of_family(episodes: Sequence[EpisodeResult]) -> dict[str, Any]:
     errors, tasks = np.array([episode.final_error for episode in episodes]), [episode.task for episode in episodes]
     return {
         "episodes": len(episodes),
         "median_error": with_interval(errors, np.median, tasks),
         "p95_error": with_interval(errors, percentile_95, tasks),
-        "within_tolerance": with_interval(errors <= tolerance(family), np.mean, tasks),
+        "within_tolerance": with_interval(errors <= episodes[0].last_family.tolerance, np.mean, tasks),
         "final_mse": with_interval([episode.final_squared_error for episode in episodes], np.mean, tasks),
         "ripple": with_interval([episode.ripple_m_s for episode in episodes], np.median, tasks),
-        "base_task_right": with_interval([base_task_right(episode)[-1] for episode in episodes], np.mean, tasks),
+        "base_task_right": with_interval([episode.base_task_right()[-1] for episode in episodes], np.mean, tasks),
         "median_error_by_seed": _by_seed(episodes),
     }
 

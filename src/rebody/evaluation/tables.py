@@ -6,7 +6,6 @@ from typing import Any
 from rich.table import Table
 
 from rebody.evaluation.results import Results
-from rebody.tasks import FAMILIES
 
 FIGURES = (
     ("median error", "median_error"),
@@ -31,9 +30,7 @@ def summary_table(results: Sequence[Results]) -> Table:
     table.add_column("")
     for result in results:
         table.add_column(f"{result.robot}, {result.agent}", justify="right")
-    for family in FAMILIES:
-        if not any(family.name in summary["families"] for summary in summaries):
-            continue
+    for family in {family.name: family for result in results for family in result.families}.values():
         ofs = [summary["families"].get(family.name, {}) for summary in summaries]
         table.add_row(f"{family.name}: episodes", *(str(of.get("episodes", 0)) for of in ofs))
         for name, key in FIGURES:

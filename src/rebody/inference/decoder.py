@@ -5,10 +5,14 @@ from collections.abc import Sequence
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float, Key, PRNGKeyArray
 
+from rebody.inference.inputs import CIRCULAR, apart, inputs_of, seen
 from rebody.inference.prior import split
 from rebody.nn import MLP
+from rebody.tasks import FamilySet
+from rebody.tasks.quantities import length
 from rebody.types import AnyArray, Belief
 
 
@@ -31,21 +35,65 @@ class Prediction(eqx.Module):
 
 
 class Expert(eqx.Module):
-    """Reads a reward as a weighted distance of some fields from a point that is linear in an amount."""
+    """Reads a reward as a weighted distance of some fields from a point that is linear in an amount.
+
+    Where the fields are one family's quantity it is their Euclidean length, else each field has a weight of its own.
+    """
 
     reference: MLP
     weights: MLP
+    fields: tuple[str, ...] = eqx.field(static=True)
+    scales: tuple[float, ...] = eqx.field(static=True)
+    is_quantity: bool = eqx.field(static=True)
 
-    def __init__(self, fields: int, amounts: int, units: int, *, keys: Key[AnyArray, "2"]):
-        self.reference = MLP(amounts, fields, (), key=keys[0])
-        self.weights = MLP(amounts, fields, (units,), key=keys[1])
+    def __init__(
+        self,
+        fields: tuple[str, ...],
+        scales: tuple[float, ...],
+        amounts: int,
+        units: int,
+        is_quantity: bool,
+        *,
+        keys: Key[AnyArray, "2"],
+    ):
+        self.fields, self.scales, self.is_quantity = fields, scales, is_quantity
+        self.reference = MLP(amounts, inputs_of(fields), (), key=keys[0])
+        self.weights = MLP(amounts, 1 if is_quantity else len(fields), (units,), key=keys[1])
 
     def __call__(
         self, state: Float[AnyArray, "*batch field"], amount: Float[AnyArray, "*batch amount"]
     ) -> Float[AnyArray, "*batch"]:
         """The expected reward, in units of the reward scale."""
-        costs = jax.nn.softplus(self.weights(amount)) * jnp.abs(state - self.reference(amount))
-        return -jnp.sum(costs, axis=-1)
+        distance = jnp.abs(apart(state, self.place(amount), self.fields, self.scales))
+        if self.is_quantity:
+            distance = length(distance)[..., None]
+        return -jnp.sum(jax.nn.softplus(self.weights(amount)) * distance, axis=-1)
+
+    def place(self, amount: Float[AnyArray, "*batch amount"]) -> Float[AnyArray, "*batch field"]:
+        """Where the fields would be brought, scaled; a heading is that of a vector."""
+        said, columns, i = self.reference(amount), [], 0
+        for field, scale in zip(self.fields, self.scales, strict=True):
+            is_heading = field in CIRCULAR
+            columns.append(jnp.arctan2(said[..., i], said[..., i + 1]) / scale if is_heading else said[..., i])
+            i += 2 if is_heading else 1
+        return jnp.stack(columns, axis=-1)
+
+    def doubt(self, amount: Belief) -> Float[AnyArray, "*batch field"]:
+        """Variance of that place, scaled; of a heading to first order."""
+        said, weights = self.reference(amount.mean), self.reference.weights[0]
+        spread = amount.variance @ weights**2
+        columns, i = [], 0
+        for field, scale in zip(self.fields, self.scales, strict=True):
+            if field in CIRCULAR:
+                sine, cosine = said[..., i, None], said[..., i + 1, None]
+                across = cosine * weights[:, i] - sine * weights[:, i + 1]  # both hang on the same amounts
+                turn = across / jnp.maximum(sine**2 + cosine**2, 1e-6) / scale
+                columns.append(jnp.sum(amount.variance * turn**2, axis=-1))
+                i += 1
+            else:
+                columns.append(spread[..., i])
+            i += 1
+        return jnp.stack(columns, axis=-1)
 
 
 class Decoder(eqx.Module):
@@ -59,10 +107,10 @@ class Decoder(eqx.Module):
     to there" need. So targets lie along straight lines of the latent and read out sharply, where an MLP in
     this place curls them up.
 
-    Where z is split, its first dimensions say *what* is to be brought there, the others *how much*. Each field has an
-    expert that is paid for that field alone, and *what* says how likely each is the one. Their rewards are not added
-    up: a blend of two fields would pay, early on, where one field is all there is to it, and get stuck there. Nor do
-    experts share what says how much: one that has explained tasks of another kind would keep theirs from being right.
+    Where z is split, its first dimensions say *what* is to be brought there, the others *how much*. Each family has an
+    expert that is paid for its quantity alone, and *what* says how likely each is the one. Their rewards are not added
+    up: a blend of two would pay, early on, where one is all there is to it, and get stuck there. Nor do experts share
+    what says how much: one that has explained tasks of another kind would keep theirs from being right.
     """
 
     state_head: MLP
@@ -70,18 +118,34 @@ class Decoder(eqx.Module):
     log_variance: MLP
     choice: MLP | None
     kinds: int = eqx.field(static=True)
+    fields: tuple[str, ...] = eqx.field(static=True)
+    scales: tuple[float, ...] = eqx.field(static=True)
 
-    def __init__(self, fields: int, actions: int, latent: int, kinds: int, units: int, *, key: PRNGKeyArray):
+    def __init__(
+        self,
+        families: FamilySet,
+        fields: tuple[str, ...],
+        scales: tuple[float, ...],
+        actions: int,
+        latent: int,
+        kinds: int,
+        units: int,
+        *,
+        key: PRNGKeyArray,
+    ):
         keys = jax.random.split(key, 4)
-        self.kinds = kinds
-        self.state_head = MLP(fields + actions + latent, fields, (units, units), key=keys[0])
-        experts = fields if kinds else 1
-        expert_keys = jax.vmap(jax.random.split)(jax.random.split(keys[1], experts)) if kinds else keys[None, 1:3]
+        self.kinds, self.fields, self.scales = kinds, fields, scales
+        inputs = inputs_of(fields)
+        self.state_head = MLP(inputs + actions + latent, len(fields), (units, units), key=keys[0])
+        read = [family.quantity.components for family in families] if kinds else [fields]
+        expert_keys = jax.vmap(jax.random.split)(jax.random.split(keys[1], len(read))) if kinds else keys[None, 1:3]
+        scale_of = dict(zip(fields, scales, strict=True))
         self.experts = tuple(
-            Expert(fields // experts, (latent - kinds) // experts, units, keys=two) for two in expert_keys
+            Expert(own, tuple(scale_of[f] for f in own), (latent - kinds) // len(read), units, bool(kinds), keys=two)
+            for own, two in zip(read, expert_keys, strict=True)
         )
-        self.log_variance = MLP(fields + latent, 1, (units, units), key=keys[3])
-        self.choice = MLP(kinds, fields, (), key=jax.random.fold_in(key, 4)) if kinds else None
+        self.log_variance = MLP(inputs + latent, 1, (units, units), key=keys[3])
+        self.choice = MLP(kinds, len(read), (), key=jax.random.fold_in(key, 4)) if kinds else None
 
     def next_state(
         self,
@@ -90,25 +154,25 @@ class Decoder(eqx.Module):
         latent: Float[AnyArray, "*batch latent"],
     ) -> Float[AnyArray, "*batch field"]:
         """Predicted fields of the next state, scaled as the encoder's."""
-        inputs = jnp.concatenate([state, action, jax.lax.stop_gradient(latent)], axis=-1)
-        return state + self.state_head(inputs)
+        inputs = [seen(state, self.fields, self.scales), action, jax.lax.stop_gradient(latent)]
+        return state + self.state_head(jnp.concatenate(inputs, axis=-1))
 
     def reward(
         self, next_state: Float[AnyArray, "*batch field"], latent: Float[AnyArray, "*batch latent"]
     ) -> Prediction:
         """The reward's prediction, in units of the reward scale; one expert where z is not split."""
         kind, amount = latent[..., : self.kinds], latent[..., self.kinds :]
-        of_each = zip(self.experts, self._split(next_state), self._split(amount), strict=True)
-        mean = jnp.stack([expert(state, own) for expert, state, own in of_each], axis=-1)
+        own = zip(self.experts, self._amounts(amount), strict=True)
+        mean = jnp.stack([expert(self._read(expert, next_state), amounts) for expert, amounts in own], axis=-1)
         log_share = jax.nn.log_softmax(self.choice(kind), axis=-1) if self.choice else jnp.zeros_like(mean)
-        log_variance = self.log_variance(jnp.concatenate([next_state, latent], axis=-1))[..., 0]
-        return Prediction(mean, log_share, jnp.clip(log_variance, -12.0, 4.0))
+        inputs = jnp.concatenate([seen(next_state, self.fields, self.scales), latent], axis=-1)
+        return Prediction(mean, log_share, jnp.clip(self.log_variance(inputs)[..., 0], -12.0, 4.0))
 
     def interpret(self, belief: Belief) -> Belief:
-        """A belief in the decoder's own terms: how likely each field is meant, then where it is to be brought.
+        """A belief in the decoder's own terms: how likely each family is meant, then where it is to be brought.
 
         So a policy need not learn what the latent's axes mean while they still move. Means and variances
-        [*batch, 2 field]; a belief that is not split says what it says, [*batch, latent].
+        [*batch, family + number]; a belief that is not split says what it says, [*batch, latent].
         """
         if self.choice is None:
             return belief
@@ -116,18 +180,22 @@ class Decoder(eqx.Module):
         # what a softmax of a Gaussian is on average (MacKay 1992)
         spread = jnp.einsum("...k,kf->...f", kind.variance, self.choice.weights[0] ** 2)
         share = jax.nn.softmax(self.choice(kind.mean) / jnp.sqrt(1 + jnp.pi / 8 * spread), axis=-1)
-        variances = zip(self.experts, self._split(amount.variance), strict=True)
-        doubt = [variance @ expert.reference.weights[0] ** 2 for expert, variance in variances]
+        of_each = zip(self.experts, self._amounts(amount.mean), self._amounts(amount.variance), strict=True)
+        doubt = [expert.doubt(Belief(mean, variance)) for expert, mean, variance in of_each]
         return Belief(
             jnp.concatenate([share, self.places(amount.mean)], axis=-1),
             jnp.concatenate([jnp.zeros_like(share), *doubt], axis=-1),
         )
 
-    def places(self, amount: Float[AnyArray, "*batch amount"]) -> Float[AnyArray, "*batch field"]:
-        """Where each field would be brought, scaled as the encoder's."""
-        of_each = zip(self.experts, self._split(amount), strict=True)
-        return jnp.concatenate([expert.reference(own) for expert, own in of_each], axis=-1)
+    def places(self, amount: Float[AnyArray, "*batch amount"]) -> Float[AnyArray, "*batch number"]:
+        """Where each family's quantity would be brought, scaled as the encoder's fields."""
+        own = zip(self.experts, self._amounts(amount), strict=True)
+        return jnp.concatenate([expert.place(amounts) for expert, amounts in own], axis=-1)
 
-    def _split(self, features: Float[AnyArray, "*batch feature"]) -> Sequence[Float[AnyArray, "*batch own"]]:
-        """What each expert sees of them."""
-        return jnp.split(features, len(self.experts), axis=-1)
+    def _amounts(self, amounts: Float[AnyArray, "*batch amount"]) -> Sequence[Float[AnyArray, "*batch own"]]:
+        """What each expert goes by."""
+        return jnp.split(amounts, len(self.experts), axis=-1)
+
+    def _read(self, expert: Expert, state: Float[AnyArray, "*batch field"]) -> Float[AnyArray, "*batch own"]:
+        """The fields that an expert is about."""
+        return state[..., np.array([self.fields.index(field) for field in expert.fields])]

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float, Int, PRNGKeyArray
 
+from rebody.inference.inputs import inputs_of, rates, scaled, seen
 from rebody.nn import GRU, MLP
 from rebody.types import DECISION_DT, AnyArray, Belief, Transition
 
@@ -55,7 +56,7 @@ class Encoder(eqx.Module):
         The first `kinds` of the latent's dimensions say what kind of task it is.
         """
         keys = jax.random.split(key, 4)
-        inputs = 2 * len(fields) + 2
+        inputs = inputs_of(fields) + len(fields) + 2
         self.embed = MLP(2 * inputs, units, (units,), key=keys[0])
         self.cell = GRU(units, units, key=keys[1])
         self.head = MLP(units + inputs, 2 * latent, (2 * units, 2 * units), key=keys[2])
@@ -67,7 +68,7 @@ class Encoder(eqx.Module):
         """Nothing seen yet."""
         return EncoderCarry(
             jnp.zeros((*shape, self.window or 1, self.cell.units)),
-            jnp.zeros((*shape, 2 * len(self.fields) + 2)),
+            jnp.zeros((*shape, inputs_of(self.fields) + len(self.fields) + 2)),
             jnp.zeros((), jnp.int32),
         )
 
@@ -114,9 +115,9 @@ class Encoder(eqx.Module):
 
     def features(self, transition: Transition) -> Float[AnyArray, "*batch feature"]:
         """Where it is, how it moved, and the reward, once more compressed so that small ones show."""
-        scales = jnp.asarray(self.scales)
-        state = transition.state.select(self.fields) / scales
-        change = (state - transition.previous.select(self.fields) / scales) / DECISION_DT
+        fields, scales = self.fields, self.scales
+        now, before = (scaled(state, fields, scales) for state in (transition.state, transition.previous))
+        state, change = seen(now, fields, scales), rates(now, before, fields, scales)
         reward = transition.reward / self.reward_scale
         rewards = jnp.stack([reward, 0.3 * jnp.arcsinh(50 * reward)], axis=-1)
         return jnp.concatenate([state, change, rewards], axis=-1)

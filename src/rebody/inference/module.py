@@ -11,14 +11,13 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from rebody.errors import RebodyError
 from rebody.inference.decoder import Decoder
 from rebody.inference.encoder import Encoder
+from rebody.inference.inputs import apart, scaled
 from rebody.inference.prior import Prior
 from rebody.nn import MLP
 from rebody.ranges import Copies, Decisions, NotNegative, Number, Positive, Rate
-from rebody.tasks import FAMILIES
+from rebody.tasks import FamilySet
 from rebody.types import AnyArray, GlobalState, Transition
 
-BASE_TASKS = 2 * len(FAMILIES)
-"""Family x sign."""
 FARTHEST_PLACE = 1.5
 """Experts are held to places within this, in units of their fields' scales. Beyond all that a body visits a distance is
 next to constant: a cheap account of any task, which keeps an expert from ever finding the true place."""
@@ -63,10 +62,21 @@ class InferenceConfig:
         """Dimensions of the latent that a mixture clusters: those that say what kind of task it is."""
         return self.kinds or self.latent
 
-    @property
-    def places(self) -> tuple[tuple[str, float], ...]:
-        """Fields that a split latent says the places of (`Decoder.interpret`), and their scales; else none."""
-        return tuple(zip(self.fields, self.scales, strict=True)) if self.kinds else ()
+    def check(self, families: FamilySet) -> None:
+        """ValueError where the encoder does not see what families are about, or a split latent cannot be shared."""
+        unseen = [name for family in families for name in family.quantity.components if name not in self.fields]
+        if unseen and self.kinds:
+            raise ValueError(f"inference.fields: {', '.join(self.fields)}, but families are about {unseen[0]} as well")
+        if turning := [family.name for family in families if family.quantity.frame != "world"]:
+            raise ValueError(
+                f"families: '{turning[0]}' is told in the frame of the heading, which no module learns yet"
+            )
+        amounts = self.latent - self.kinds
+        if self.kinds and (amounts < 1 or amounts % len(families)):
+            raise ValueError(
+                f"inference.latent: {self.latent} with {self.kinds} for the kind leaves {amounts}, which "
+                f"{len(families)} families cannot share evenly"
+            )
 
 
 class InferenceModule(eqx.Module):
@@ -77,16 +87,15 @@ class InferenceModule(eqx.Module):
     labeller: MLP | None
     """Latent -> logits of the base tasks, where labels are used."""
 
-    def __init__(self, config: InferenceConfig, actions: int, key: PRNGKeyArray):
+    def __init__(self, config: InferenceConfig, families: FamilySet, actions: int, key: PRNGKeyArray):
         """`actions`: size of the toy's action, which only the decoder sees.
 
-        RebodyError if a split latent has not as many amounts for each field.
+        RebodyError where the settings do not suit the families.
         """
-        if config.kinds and (config.latent - config.kinds) % len(config.fields):
-            raise RebodyError(
-                f"a latent of {config.latent} with {config.kinds} for the kind leaves {config.latent - config.kinds}, "
-                f"which {len(config.fields)} fields cannot share evenly. Choose another --inference.latent."
-            )
+        try:
+            config.check(families)
+        except ValueError as error:
+            raise RebodyError(f"--{error}.") from None
         encoder_key, decoder_key = jax.random.split(key)
         label_key = jax.random.fold_in(key, 2)
         self.encoder = Encoder(
@@ -99,8 +108,17 @@ class InferenceModule(eqx.Module):
             units=config.units,
             key=encoder_key,
         )
-        self.decoder = Decoder(len(config.fields), actions, config.latent, config.kinds, config.units, key=decoder_key)
-        self.labeller = MLP(config.latent, BASE_TASKS, (), key=label_key) if config.label_weight else None
+        self.decoder = Decoder(
+            families,
+            config.fields,
+            config.scales,
+            actions,
+            config.latent,
+            config.kinds,
+            config.units,
+            key=decoder_key,
+        )
+        self.labeller = MLP(config.latent, families.base_tasks, (), key=label_key) if config.label_weight else None
 
 
 class Evidence(eqx.Module):
@@ -123,13 +141,13 @@ def loss(
     belief = encoder.along(evidence.window)
     noise = jax.random.normal(key, belief.mean.shape)
     latent = belief.mean + jnp.sqrt(belief.variance) * noise  # [batch, time, latent]
-    scales = jnp.asarray(encoder.scales)
-    before = evidence.previous.select(encoder.fields) / scales
-    after = evidence.state.select(encoder.fields) / scales
+    fields, scales = encoder.fields, encoder.scales
+    before, after = (scaled(state, fields, scales) for state in (evidence.previous, evidence.state))
 
     # the state's prediction does not shape the latent, so one belief of a window is enough
     last = jnp.broadcast_to(latent[:, -1:], (*before.shape[:2], config.latent))
-    state_error = jnp.mean((decoder.next_state(before, evidence.action, last) - after) ** 2)
+    predicted_state = decoder.next_state(before, evidence.action, last)
+    state_error = jnp.mean(apart(predicted_state, after, fields, scales) ** 2)
 
     shape = (*latent.shape[:2], config.decoded)
     latents = jnp.broadcast_to(latent[:, :, None], (*shape, config.latent))

@@ -24,6 +24,8 @@ LOOK: dict[Any, Any] = {
 }
 TASKS = "coolwarm"
 """Colour map of targets: back is blue, front is red."""
+SHADES = (1.0, 0.6, 0.4, 0.25)
+"""Opacity of a vector's components, by turns."""
 LETTERS = 44
 """Of a name that a user chose: more would not fit beside axes."""
 

@@ -17,7 +17,8 @@ from rebody.bodies import RobotSpec, Simulation
 from rebody.bodies.camera import Camera, Pole
 from rebody.errors import RebodyError
 from rebody.evaluation.episode import EpisodeResult
-from rebody.evaluation.evaluate import Trial, evaluate
+from rebody.evaluation.evaluate import evaluate
+from rebody.evaluation.trial import Trial
 from rebody.report.figures import draw_progress
 from rebody.store.files import written_whole
 from rebody.tasks.task_file import TaskSpec
@@ -109,15 +110,23 @@ def _frames(spec: RobotSpec, poses: list[Float[np.ndarray, " nq"]], episode: Epi
 
 
 def _poles(episode: EpisodeResult, decision: int) -> list[Pole]:
-    """Where the hidden goal is, and where it is believed to be after the last finished decision."""
-    if episode.active_family[decision] != "goal":
+    """Where the hidden place is, and where it is believed to be after the last finished decision."""
+    hidden = _x_of(episode, episode.active_family[decision], episode.active_target[decision])
+    if hidden is None:
         return []
-    poles = [Pole(episode.active_target[decision], TRUTH_POLE)]
-    return [*poles, Pole(episode.inferred_target[decision - 1], BELIEF_POLE)] if decision else poles
+    before = max(decision - 1, 0)
+    believed = _x_of(episode, episode.inferred_family[before], episode.inferred_target[before]) if decision else None
+    return [Pole(hidden, TRUTH_POLE), *([] if believed is None else [Pole(believed, BELIEF_POLE)])]
+
+
+def _x_of(episode: EpisodeResult, family: str, target: list[float]) -> float | None:
+    """Where along x a target is; None where it says nothing of that."""
+    names = episode.families.named(family).quantity.components
+    return target[names.index("x")] if "x" in names else None
 
 
 def _plot(episode: EpisodeResult, until: int) -> UInt8[np.ndarray, "height width 3"]:
-    size, families = (WIDTH / 100, PLOT_HEIGHT / 100), episode.families
+    size, families = (WIDTH / 100, PLOT_HEIGHT / 100), episode.asked
     drawing, panels = plt.subplots(1, len(families), figsize=size, dpi=100, layout="constrained", squeeze=False)
     for axes, family in zip(panels[0], families, strict=True):
         draw_progress(axes, episode, family, until)

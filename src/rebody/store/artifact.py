@@ -19,7 +19,7 @@ from rebody.store.files import WEIGHTS as LARGEST_WEIGHTS
 from rebody.store.folders import STAGE, replace_together, settle
 from rebody.store.trees import tree_to_arrays
 
-FORMAT_VERSION, LARGEST_VERSION = 1, 10**6
+FORMAT_VERSION, LARGEST_VERSION = 2, 10**6
 SHIPPED = Path(__file__).parents[1] / "artifacts"
 
 WEIGHTS, CONFIG, CARD, LOG = "weights.safetensors", "config.json", "card.md", "log.csv"

@@ -3,7 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from rebody.tasks.families import FAMILIES, Family, family_named
+from rebody.tasks.family import Family
+from rebody.tasks.family_set import FamilySet
 from rebody.types import DECISION_DT, GlobalState, Task
 
 LAST_S = 2.0
@@ -11,21 +12,21 @@ LAST_S = 2.0
 SECOND = round(1.0 / DECISION_DT)
 """Decisions of the second that a family may be judged by."""
 
-Series = Float[np.ndarray, "time *episode"]
+Series = Float[np.ndarray, "time *rest"]
 
 
-def final_error(task: Task, state: GlobalState) -> Float[np.ndarray, "*episode"]:
-    """Mean over the last 2 s of |difference| [m, m/s, rad] between target and quantity, as its family settles it: of a
+def final_error(families: FamilySet, task: Task, state: GlobalState) -> Float[np.ndarray, "*episode"]:
+    """Mean over the last 2 s of the distance [m, m/s, rad] between target and quantity, as its family settles it: of a
     velocity the mean of 1 s, of a jump the largest of 1 s.
 
     `task` is the last one, [*episode]; `state` that after each decision, [time, *episode].
     """
-    return _missed(task, state, round(LAST_S / DECISION_DT), settles=True).mean(axis=0)
+    return _missed(families, task, state, round(LAST_S / DECISION_DT), settles=True).mean(axis=0)
 
 
-def final_squared_error(task: Task, state: GlobalState) -> Float[np.ndarray, "*episode"]:
+def final_squared_error(families: FamilySet, task: Task, state: GlobalState) -> Float[np.ndarray, "*episode"]:
     """Squared error at the last decision [m^2, (m/s)^2, rad^2], to compare with ReMAP; velocities at that decision."""
-    return _missed(task, state, 1, settles=False)[-1] ** 2
+    return _missed(families, task, state, 1, settles=False)[-1] ** 2
 
 
 def ripple(state: GlobalState) -> Float[np.ndarray, "*episode"]:
@@ -34,13 +35,8 @@ def ripple(state: GlobalState) -> Float[np.ndarray, "*episode"]:
     return np.std((velocity - mean_of_last_second(velocity))[-round(LAST_S / DECISION_DT) :], axis=0)
 
 
-def tolerance(family: str) -> float:
-    """Within which final error an episode counts as solved [m, m/s, rad]."""
-    return family_named(family).tolerance
-
-
 def settled(family: Family, series: Series) -> Series:
-    """What a family judges at each moment, of its quantity after each decision."""
+    """What a family judges at each moment, of its quantity after each decision, [time, *episode, size]."""
     match family.settle:
         case "mean of 1 s":
             return mean_of_last_second(series)
@@ -60,18 +56,18 @@ def largest_of_last_second(series: Series) -> Series:
     return _seconds(series, -np.inf).max(axis=-1)
 
 
-def _missed(task: Task, state: GlobalState, last: int, *, settles: bool) -> Series:
-    """|difference| of each episode at the last decisions; nobody can hold a jump, so it is settled all the same."""
-    family, of_each = np.asarray(task.family), []
-    for each in FAMILIES:
-        series = np.asarray(each.quantity.read(state), float)[..., 0]
+def _missed(families: FamilySet, task: Task, state: GlobalState, last: int, *, settles: bool) -> Series:
+    """Distance of each episode at the last decisions; nobody can hold a jump, so it is settled all the same."""
+    family, target, of_each = np.asarray(task.family), np.asarray(task.target, float), []
+    for each in families:
+        series = np.asarray(each.quantity.read(state), float)
         judged = settled(each, series) if settles or each.settle == "largest of 1 s" else series
-        of_each.append(np.abs(each.quantity.difference(judged[-last:], np.asarray(task.target, float))))
-    chosen = np.broadcast_to(family, (len(of_each[0]), *family.shape))
+        of_each.append(each.quantity.distance(judged[-last:], target[..., : each.size]))
+    chosen = np.broadcast_to(family, of_each[0].shape)
     return np.take_along_axis(np.stack(of_each), chosen[None], axis=0)[0]
 
 
-def _seconds(series: Series, before: float) -> Float[np.ndarray, "time *episode decision"]:
+def _seconds(series: Series, before: float) -> Float[np.ndarray, "time *rest decision"]:
     """The second that ends with each decision; `before` stands for what was before the first."""
     padded = np.concatenate([np.full((SECOND - 1, *series.shape[1:]), before), series])
     return np.lib.stride_tricks.sliding_window_view(padded, SECOND, axis=0)

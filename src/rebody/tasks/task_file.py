@@ -1,28 +1,34 @@
 """Task files: a JSON list of tasks, each with an optional change in mid-episode."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 
 from rebody import inputs
 from rebody.errors import RebodyError
+from rebody.ranges import Finite
 from rebody.store.files import TEXT, read_file
-from rebody.tasks.families import family_index
+from rebody.store.typed import Misfit, typed
+from rebody.tasks.family_set import FamilySet
 from rebody.types import Task
 
+MOST_TASKS = 20_000
+"""In one file; more cannot be evaluated at once, and checking them would take minutes."""
 EXAMPLE = '[{"family": "goal", "target": -9.0}]'
+Target = tuple[Finite, ...]
 
 
 @dataclass(frozen=True)
 class Switch:
     """Another task from some moment on."""
 
-    at_s: float
+    at_s: Annotated[float, Meta(ge=0, le=3600)]
     family: str
-    target: float
+    target: Target
 
 
 @dataclass(frozen=True)
@@ -30,7 +36,7 @@ class TaskSpec:
     """The task of one episode."""
 
     family: str
-    target: float
+    target: Target
     switch: Switch | None = None
 
     @property
@@ -38,9 +44,27 @@ class TaskSpec:
         """The task that the episode ends with, which its final error is taken against."""
         return self if self.switch is None else TaskSpec(self.switch.family, self.switch.target)
 
+    def to_json(self) -> dict[str, Any]:
+        """As in a task file; a vector of one is a number."""
+        own, switch = {"family": self.family, "target": _plain(self.target)}, None
+        if self.switch is not None:
+            after = {"family": self.switch.family, "target": _plain(self.switch.target)}
+            switch = {"at_s": self.switch.at_s, **after}
+        return {**own, "switch": switch}
 
-def read_tasks(path: Path) -> list[TaskSpec]:
+    @property
+    def families(self) -> tuple[str, ...]:
+        """Those that are asked for, in their order in time."""
+        return tuple(dict.fromkeys((self.family, self.last.family)))
+
+
+def read_tasks(path: Path, families: FamilySet) -> list[TaskSpec]:
     """The tasks of a file; RebodyError that names the entry and what is wrong with it."""
+    return [_task(entry, families, f"{path}, task {i}") for i, entry in enumerate(task_entries(path))]
+
+
+def task_entries(path: Path) -> list[Any]:
+    """What a file lists, whatever it means; RebodyError if it is no list. Ask it before what is slow to load."""
     try:
         content = json.loads(read_file(path, TEXT).decode("utf-8-sig"))
     except FileNotFoundError:
@@ -49,59 +73,59 @@ def read_tasks(path: Path) -> list[TaskSpec]:
         raise RebodyError(f"{path} is not a JSON file ({error}). A task file looks like {EXAMPLE}") from None
     if not isinstance(content, list) or not content:
         raise RebodyError(f"{path} must hold a list of at least one task, such as {EXAMPLE}")
-    return [_task(entry, f"{path}, task {i}") for i, entry in enumerate(content)]
+    if len(content) > MOST_TASKS:
+        raise RebodyError(f"{path} holds {len(content):,} tasks; at most {MOST_TASKS:,} are read. Split it.")
+    return content
 
 
-def parse_task(text: str) -> TaskSpec:
-    """A task written FAMILY=TARGET, such as goal=-9."""
+def parse_task(text: str, families: FamilySet) -> TaskSpec:
+    """A task written FAMILY=TARGET, such as goal=-9, or place=3,-2 where a target is a vector."""
     family, equals, target = text.partition("=")
     try:
-        entry = None if "_" in target else {"family": family, "target": float(target)}
+        numbers = None if "_" in target else [float(number) for number in target.split(",")]
     except ValueError:
-        entry = None
-    if not equals or entry is None:
+        numbers = None
+    if not equals or numbers is None:
         raise RebodyError(f"'{text}' is not a task; write FAMILY=TARGET, such as goal=-9 or velocity=1.5.")
-    return _task(entry, f"'{text}'")
+    checked = [inputs.number(number, "the target", f"'{text}'") for number in numbers]
+    return _task({"family": family, "target": checked}, families, f"'{text}'")
 
 
-def active_tasks(specs: list[TaskSpec], decisions: int, decision_dt: float) -> Task:
+def active_tasks(specs: list[TaskSpec], families: FamilySet, decisions: int, decision_dt: float) -> Task:
     """Which task is on during each decision: arrays [decision, episode]."""
-    family = np.array([[family_index(spec.family)] * decisions for spec in specs], np.int32).T
-    target = np.array([[spec.target] * decisions for spec in specs], np.float32).T
+    family = np.zeros((decisions, len(specs)), np.int32)
+    target = np.zeros((decisions, len(specs), families.size), np.float32)
     for episode, spec in enumerate(specs):
-        if spec.switch is not None:
-            begins = round(spec.switch.at_s / decision_dt)
-            family[begins:, episode] = family_index(spec.switch.family)
-            target[begins:, episode] = spec.switch.target
-    return Task(family.copy(), target.copy())
+        begins = decisions if spec.switch is None else round(spec.switch.at_s / decision_dt)
+        for when, task in ((slice(begins), spec), (slice(begins, None), spec.last)):
+            one = families.task(task.family, task.target)
+            family[when, episode], target[when, episode] = one.family, one.target
+    return Task(family, target)
 
 
-def _task(entry: Any, where: str) -> TaskSpec:
-    _check_keys(entry, {"family", "target"}, {"switch"}, where)
-    switch = entry.get("switch")
-    if switch is not None:
-        _check_keys(switch, {"at_s", "family", "target"}, set(), f"{where}, switch")
-        at_s = inputs.number(switch["at_s"], "'at_s'", f"{where}, switch")
-        switch = Switch(at_s, *_family_and_target(switch, f"{where}, switch"))
-        if switch.at_s < 0:
-            raise RebodyError(f"{where}: the switch cannot be before the start (at_s = {switch.at_s}).")
-    return TaskSpec(*_family_and_target(entry, where), switch)
+def _plain(target: Target) -> float | list[float]:
+    return target[0] if len(target) == 1 else list(target)
 
 
-def _check_keys(entry: Any, needed: set[str], allowed: set[str], where: str) -> None:
-    if not isinstance(entry, dict):
-        raise RebodyError(f"{where}: expected an object such as {EXAMPLE[1:-1]}, got {json.dumps(entry)}")
-    if missing := sorted(needed - entry.keys()):
-        raise RebodyError(f"{where}: '{missing[0]}' is missing.")
-    if unknown := sorted(entry.keys() - needed - allowed):
-        raise RebodyError(f"{where}: unknown key '{unknown[0]}'; known are {', '.join(sorted(needed | allowed))}.")
-
-
-def _family_and_target(entry: dict[str, Any], where: str) -> tuple[str, float]:
-    if not isinstance(entry["family"], str):
-        raise RebodyError(f"{where}: the family must be a name, got {json.dumps(entry['family'])}.")
+def _task(entry: Any, families: FamilySet, where: str) -> TaskSpec:
+    """A number is a vector of one."""
     try:
-        family_index(entry["family"])
+        said = typed(_with_vectors(entry), TaskSpec)
+        switch = said.switch and replace(said.switch, target=_admitted(said.switch, families))
+        return TaskSpec(said.family, _admitted(said, families), switch)
+    except Misfit as misfit:
+        raise RebodyError(f"{where}: {misfit}. A task looks like {EXAMPLE[1:-1]}") from None
     except RebodyError as error:
         raise RebodyError(f"{where}: {error}") from None
-    return entry["family"], inputs.number(entry["target"], "the target", where)
+
+
+def _admitted(task: Switch | TaskSpec, families: FamilySet) -> Target:
+    return families.named(task.family).admit(task.target)
+
+
+def _with_vectors(entry: Any) -> Any:
+    if not isinstance(entry, dict):
+        return entry
+    target = entry.get("target")
+    vector = {"target": [target]} if isinstance(target, int | float) and not isinstance(target, bool) else {}
+    return entry | vector | ({"switch": _with_vectors(entry["switch"])} if "switch" in entry else {})

@@ -21,12 +21,12 @@ from rebody.agents.parts import Inference, LoadedTracker, load_high_level, load_
 from rebody.agents.rollout import follow
 from rebody.bodies import RobotBatch
 from rebody.control.high_level import high_level_sac
+from rebody.control.places import Places, numbers_of
 from rebody.control.sac import Actor, SACBatch, SACConfig, SACState
-from rebody.control.slot_policy import SlotPolicy, Slots, draw, judge, slot_sac, slots_within, subgoal_of
+from rebody.control.slot_policy import SlotPolicy, SlotValue, draw, slot_sac, slots_within, subgoal_of
 from rebody.jax_settings import own_jax_settings
 from rebody.ranges import Copies, Count, Decisions, NotNegative, Number, Positive, Rows
 from rebody.store import tree_hash
-from rebody.tasks import FAMILIES
 from rebody.training.arrival import arrival_bonus
 from rebody.training.card import save
 from rebody.training.held_out import act, figures_of, rows_of
@@ -87,7 +87,7 @@ def train_high_level(
     spec, module = ready_robot(robot, config), load_inference(inference)
     loaded = load_tracker(f"tracker-{spec.name}" if tracker is None else tracker)
     check_robot_of(loaded, spec)
-    module.contract.check_body(spec.name, spec.moving_fields, loaded.tracker.slots)
+    module.contract.check_body(spec.name, spec.moving_fields, loaded.tracker.families.names)
     settings = {"robot": robot, "inference": inference, "tracker": tracker, "seed": seed}
     learner = HighLevelLearner(spec, config, module, loaded)
     return train(learner, out, settings, resume=resume, finish=finish, init_from=init_from)
@@ -103,19 +103,19 @@ class HighLevelLearner(Learner[TaskInference]):
     tracker: LoadedTracker
 
     @cached_property
-    def slots(self) -> Slots:
+    def slots(self) -> Places:
         """One for each family that the module tells apart."""
-        return slots_within(self.module.contract.families, self.tracker.tracker.reach)
+        return slots_within(self.module.contract.families, self.tracker.tracker.families)
 
     @cached_property
     def controller(self) -> TrackerController:
         """What follows the subgoals."""
-        return TrackerController(self.tracker.tracker, self.spec.goal_ahead)
+        return TrackerController(self.tracker.tracker, self.module.contract.families, self.spec.goal_ahead)
 
     def sizes(self, batch: RobotBatch) -> tuple[int, int]:
-        """Those of the toy's policy, and a number for each slot."""
+        """Those of the toy's policy, and the numbers of each slot."""
         parts = self.module.parts
-        return parts.high_level.view.size(parts.module.encoder.latent), len(self.slots)
+        return parts.high_level.view.size(parts.module.encoder.latent), numbers_of(self.slots)
 
     def begin(self, batch: RobotBatch, actor: Actor, key: PRNGKeyArray) -> TaskInference:
         """Robots that know nothing."""
@@ -136,7 +136,7 @@ class HighLevelLearner(Learner[TaskInference]):
             observation = self.observe(known)
             action, subgoal = _explore(state.sac.actor, observation, known.state, self.slots, action_key)
             now, fell = decision(batch, lambda _: follow(self.controller, batch, subgoal))  # noqa: B023 (used at once)
-            known, earned = infer(encoder, known, now, module.contract.reward)
+            known, earned = infer(encoder, known, now, module.contract.families)
             seen = SACBatch(
                 observation=np.asarray(observation),
                 action=np.asarray(action),
@@ -157,15 +157,14 @@ class HighLevelLearner(Learner[TaskInference]):
 
     def update(self, policy: SACState, drawn: Any, key: PRNGKeyArray, iteration: int) -> tuple[SACState, dict]:
         """Values are of the slot that is chosen in the end."""
-        return learn(policy, drawn, key, slot_sac(self.config.sac, len(self.slots)), judge=judge)
+        return learn(policy, drawn, key, slot_sac(self.config.sac, len(self.slots)), action_value=SlotValue(self.slots))
 
     def measure(self, actor: Actor) -> dict[str, float]:
         """Final error of each family, return, share that fell."""
         module, config = self.module, self.config
         agent = build_agent("retrain", module, high_level=self.policy(actor))
-        tasks, form = tasks_within(module, self.spec.reach), module.contract.reward
-        size, seconds = config.held_out, config.held_out_s
-        return figures_of(*act(agent, self.controller, self.spec, tasks, form, size, seconds))
+        tasks = tasks_within(module, self.spec.reach)
+        return figures_of(tasks, *act(agent, self.controller, self.spec, tasks, config.held_out, config.held_out_s))
 
     def save(self, actor: Actor, figures: dict[str, float], run: Run) -> Path:
         """A high-level policy's artifact."""
@@ -177,7 +176,7 @@ class HighLevelLearner(Learner[TaskInference]):
             tracker=tracker.name,
             tracker_hash=tree_hash(tracker.tracker),
             view=module.parts.high_level.view,
-            slots={FAMILIES[family].name: scale for family, scale in self.slots},
+            slots=self.slots,
             observations=actor.observations,
             hidden=config.sac.hidden,
             projections=config.sac.projections,
@@ -190,7 +189,7 @@ class HighLevelLearner(Learner[TaskInference]):
             f"{decisions * self.spec.steps_per_decision:,} control steps, with "
             f"{run.iterations * config.updates:,} updates; module and tracker are frozen."
         )
-        rows = rows_of(figures, config.held_out, config.held_out_s)
+        rows = rows_of(self.module.contract.families, figures, config.held_out, config.held_out_s)
         return save("high-level", settings, self.policy(actor), run, f"High-level policy: {robot}", what, rows)
 
     def load_actor(self, artifact: str) -> Actor:
@@ -216,7 +215,7 @@ def _view(view, decoder, known: TaskInference) -> Float[AnyArray, "robot feature
 
 
 @eqx.filter_jit
-def _explore(actor: Actor, observation, state: GlobalState, slots: Slots, key: PRNGKeyArray):
+def _explore(actor: Actor, observation, state: GlobalState, slots: Places, key: PRNGKeyArray):
     value_key, slot_key = jax.random.split(key)
-    pooled = draw(actor.sample(observation, value_key)[0], slot_key)
+    pooled = draw(actor.sample(observation, value_key)[0], slots, slot_key)
     return pooled, subgoal_of(pooled, state, slots)

@@ -1,4 +1,4 @@
-"""How training moves a batch of robots: the places that read and write its positions, and what a step was worth."""
+"""How training moves a batch of robots, and what a control step was worth."""
 
 from collections.abc import Callable
 
@@ -7,83 +7,76 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from rebody.bodies import RobotBatch
-from rebody.bodies.robot import Reach
-from rebody.control.tracker import Command, Motion, TrackerReward, relative, tracker_observation, tracker_reward
-from rebody.types import GlobalState, Subgoal, Task
+from rebody.control.command import YAW, Command, Motion, addressed, relative, slots_among
+from rebody.control.tracker import TrackerReward, tracker_observation, tracker_reward
+from rebody.tasks import FamilySet
+from rebody.tasks.quantities import turned, wrapped
+from rebody.types import ANGLES, POSE_FIELDS, GlobalState, Pose, Subgoal, Task
+
+ATTITUDE = slice(len(POSE_FIELDS) - len(ANGLES), None)
+"""Where the angles of a pose stand."""
 
 
 def decision(
     batch: RobotBatch, control_step: Callable[[int], object]
 ) -> tuple[GlobalState, Bool[np.ndarray, " robot"]]:
     """Move robots by the control steps of a decision; their state after it, and which of them fell."""
-    before, fell = batch.qpos.copy(), np.zeros(batch.size, bool)
-    for step in range(batch.spec.steps_per_decision):
+    fell = np.zeros(batch.size, bool)
+    for step in range(batch.steps_per_decision):
         control_step(step)
         fell |= batch.fallen
-    return batch.spec.observe(batch.qpos, before), fell
-
-
-class LastDecision(eqx.Module):
-    """Where robots were when their last decision began; written in place."""
-
-    qpos: Float[np.ndarray, "robot nq"]
-
-    @classmethod
-    def of(cls, batch: RobotBatch) -> "LastDecision":
-        """It begins now."""
-        return cls(batch.qpos.copy())
-
-    def next(self, batch: RobotBatch) -> GlobalState:
-        """The state of robots at the end of it; the next one begins."""
-        state = batch.spec.observe(batch.qpos, self.qpos)
-        self.qpos[:] = batch.qpos
-        return state
-
-    def restart(self, batch: RobotBatch, who: Bool[np.ndarray, " robot"] | slice = slice(None)) -> None:
-        """Those robots were set down where they are."""
-        self.qpos[who] = batch.qpos[who]
+    return batch.observe(), fell
 
 
 def put_on_feet(batch: RobotBatch, rng: np.random.Generator) -> None:
     """A robot that has fallen is put on its feet where it lies: episode and belief go on."""
-    fallen, x = batch.fallen, batch.x
+    fallen, pose = batch.fallen, batch.pose()
     batch.reset(rng, fallen)
-    batch.place(x[fallen], who=fallen)
+    x, y, yaw = (pose[fallen, POSE_FIELDS.index(name)] for name in ("x", "y", "yaw"))
+    batch.place(x, y, yaw, fallen)
 
 
-def motion_of(batch: RobotBatch, before: Float[np.ndarray, "robot nq"]) -> Motion:
-    """What the control step did that began with the joint positions `before`."""
-    x, z, pitch = batch.spec.root_addresses
-    moved = (batch.qpos - before).astype(np.float32)
-    pitch_now = batch.spec.pitch(batch.qpos).astype(np.float32)
-    filtered_speed = batch.pace.astype(np.float32)
-    return Motion(moved[:, x], moved[:, pitch], pitch_now, filtered_speed, batch.fallen, moved[:, z])
+def motion_of(batch: RobotBatch, before: Float[np.ndarray, "robot 6"]) -> Motion:
+    """What the control step did that began in the poses `before`."""
+    pose = batch.pose()
+    moved = pose - before
+    moved[:, ATTITUDE] = wrapped(moved[:, ATTITUDE])
+    moved[:, 0], moved[:, 1] = turned(moved[:, 0], moved[:, 1], -before[:, YAW], np)
+    velocity = moved / batch.step_s
+    velocity[:, 0] = batch.pace
+    displacement, now, speed = (numbers.astype(np.float32) for numbers in (moved, pose, velocity))
+    return Motion(displacement, now, speed, batch.fallen)
 
 
-def no_command(size: int) -> Command:
+def no_command(size: int, families: FamilySet) -> Command:
     """To stay, for so many robots."""
-    return Command(np.zeros(size, np.int32), np.zeros(size, np.float32))
+    return Command(np.zeros(size, np.int32), np.zeros((size, families.size), np.float32))
 
 
-def tracker_features(batch: RobotBatch, reach: Reach) -> int:
+def tracker_features(batch: RobotBatch, families: FamilySet) -> int:
     """Numbers that a tracker sees."""
-    return tracker_observation(batch.proprioception(), no_command(batch.size), reach).shape[-1]
+    return tracker_observation(batch.proprioception(), no_command(batch.size, families), families).shape[-1]
 
 
 def privileged_reward(
     batch: RobotBatch,
-    before: Float[np.ndarray, "robot nq"],
+    before: Float[np.ndarray, "robot 6"],
     task: Task,
     action: Float[np.ndarray, "robot action"],
+    families: FamilySet,
+    commands: FamilySet,
     weights: TrackerReward,
 ) -> Float[np.ndarray, " robot"]:
-    """What a tracker would be paid for the control step that led here from `before`, were it told the task."""
-    spec = batch.spec
-    x, _, pitch = before[:, spec.root_addresses].astype(np.float32).T
-    wanted, motion = Subgoal(np.asarray(task.family), np.asarray(task.target)), motion_of(batch, before)
-    return np.asarray(_paid(wanted, x, pitch, motion, action, spec.control_dt, spec.reach, weights))
+    """What a tracker of those commands would be paid for the control step that led here from the poses `before`, were
+    it told the task, which is one of `families`.
+    """
+    wanted = addressed(Subgoal(np.asarray(task.family), np.asarray(task.target)), slots_among(families, commands))
+    motion, pose = motion_of(batch, before), before.astype(np.float32)
+    return np.asarray(_paid(wanted, pose, motion, action, batch.step_s, commands, weights))
 
 
 @eqx.filter_jit
-def _paid(wanted: Subgoal, x, pitch, motion: Motion, action, control_dt: float, reach: Reach, weights: TrackerReward):
-    return tracker_reward(relative(wanted, x, pitch), motion, control_dt, action, reach, weights)
+def _paid(
+    wanted: Subgoal, pose: Pose, motion: Motion, action, step_s: float, commands: FamilySet, weights: TrackerReward
+):
+    return tracker_reward(relative(commands, wanted, pose), motion, step_s, action, commands, weights)

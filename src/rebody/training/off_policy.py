@@ -17,7 +17,7 @@ from jaxtyping import Float, Int, PRNGKeyArray
 from rebody.bodies import RobotBatch, RobotSpec, load_robot
 from rebody.bodies.check import require_ready
 from rebody.control import sac
-from rebody.control.sac import Actor, Judge, SACBatch, SACConfig, SACState, whole
+from rebody.control.sac import ActionValue, Actor, SACBatch, SACConfig, SACState, value_of_action
 from rebody.ranges import Copies, Count, Episodes, Number, Rows, Seconds, check_ranges
 from rebody.training.replay import Replay
 from rebody.training.run import Metrics, Run, measured
@@ -174,11 +174,11 @@ def learn(
     key: PRNGKeyArray,
     config: SACConfig,
     batch_of: Callable[[Any, PRNGKeyArray], SACBatch] = as_stored,
-    judge: Judge = whole,
+    action_value: ActionValue = value_of_action,
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """An update of soft actor-critic for each batch that `batch_of` makes of rows; they have the update first."""
     keys = jax.random.split(key, len(jax.tree.leaves(drawn)[0]))
-    return sac.update_many(policy, batch_of, drawn, keys, config, judge)
+    return sac.update_many(policy, batch_of, drawn, keys, config, action_value)
 
 
 @eqx.filter_jit

@@ -105,6 +105,8 @@ class Run:
     def _check_folder(self) -> None:
         if self.out.exists() and not self.out.is_dir():
             raise RebodyError(f"{self.out} is a file; a run needs a folder. Choose another --out.")
+        if not next(parent for parent in self.out.absolute().parents if parent.exists()).is_dir():
+            raise RebodyError(f"{self.out} lies below a file; a run needs a folder. Choose another --out.")
         if not self.resume and ((self.out / FOLDER).exists() or (self.out / MANIFEST).exists()):
             raise RebodyError(
                 f"{self.out} already holds a run. Add --resume to go on with it, or choose another --out."

@@ -1,18 +1,21 @@
 """The panel of controls: what is clicked becomes an order to the page."""
 
 import math
+import operator
 import queue
 import random
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import viser
 
 from rebody.errors import RebodyError
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.inputs import number
 from rebody.names import AGENTS
-from rebody.tasks import FAMILIES, family_named, family_names
+from rebody.ranges import Box
+from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.session import target_range
@@ -21,8 +24,8 @@ PUSHES = {"-1": -1.0, "-0.5": -0.5, "+0.5": 0.5, "+1": 1.0}
 """What buttons say, and what they add to the velocity [m/s]."""
 SPEEDS, REAL_TIME = (0.1, 2.0), 1.0
 """Slowest and fastest simulation, and the one to begin with, in simulated seconds per second."""
-FARTHEST_DRAWN = 0.4
-"""A task that is drawn at random asks for at least this share of the largest target."""
+FARTHEST_DRAWN, TRIES = 0.4, 50
+"""A task that is drawn at random asks for at least this share of the largest target, if one is found at all."""
 
 
 @dataclass(frozen=True)
@@ -75,16 +78,14 @@ class Controls:
         self.orders: queue.SimpleQueue[Order] = queue.SimpleQueue()
         self.paused = False
         self._offered = offered
-        self._ranges: dict[str, tuple[float, float]] = {}
+        self._ranges: dict[str, Box] = {}
+        self._gui = gui
         gui.add_markdown(words.INTRODUCTION)
         self._status = gui.add_html("")
-        with gui.add_folder("Hidden task"):
-            self._family = gui.add_dropdown(
-                "Kind",
-                family_names(),
-                hint="; ".join(f"{family.name}: {family.asks}" for family in FAMILIES),
-            )
-            self._target = gui.add_slider("Target", 0.0, 1.0, 0.1, 0.0)
+        self._task = gui.add_folder("Hidden task")
+        with self._task:
+            self._family = gui.add_dropdown("Kind", SHIPPED.names)
+            self._targets = [gui.add_slider("Target", 0.0, 1.0, 0.1, 0.0)]
             self._give = gui.add_button("Change the task now", icon=viser.Icon.TARGET)
             self._draw = gui.add_button("Any other task", icon=viser.Icon.DICE, color="gray")
         with gui.add_folder("The robot"):
@@ -118,8 +119,9 @@ class Controls:
 
     def show_task(self, trial: Trial, task: TaskSpec) -> None:
         """The hidden task, and which others there are."""
-        families = trial.inference.contract.target_ranges
-        self._ranges = {name: _in_tenths(*target_range(trial, name)) for name in families}
+        self._known = trial.inference.contract.families
+        self._ranges = {name: _in_tenths(target_range(trial, name)) for name in self._known.names}
+        self._family.hint = "; ".join(f"{family.name}: {family.label}" for family in self._known)
         self._family.options = tuple(self._ranges)
         self._family.value = task.family
         self._show_range(task.family, task.target)
@@ -167,26 +169,45 @@ class Controls:
     def _chosen_task(self) -> TaskSpec:
         family = self._family.value
         _check_among(self._ranges, family, "kind of task")
-        return TaskSpec(family, _within(number(self._target.value, "the target"), self._ranges[family]))
+        box = self._ranges[family]
+        said = [number(slider.value, "the target") for slider in self._targets[: box.size]]
+        return TaskSpec(family, tuple(map(_within, said, zip(box.low, box.high, strict=True))))
 
-    def _show_range(self, family: str, target: float | None = None) -> None:
+    def _show_range(self, family: str, target: Sequence[float] | None = None) -> None:
         _check_among(self._ranges, family, "kind of task")
-        low, high = self._ranges[family]
-        self._target.label = f"Target [{family_named(family).unit}]"
-        self._target.min, self._target.max = low, high
-        self._target.value = round(high / 2, 1) if target is None else target
+        box, quantity = self._ranges[family], self._known.named(family).quantity
+        self._add_sliders(quantity.size)
+        for i, (slider, low, high) in enumerate(zip(self._targets, box.low, box.high, strict=False)):
+            component = f" {quantity.components[i]}" if quantity.size > 1 else ""
+            slider.label = f"Target{component} [{quantity.unit}]"
+            slider.min, slider.max = low, high
+            slider.value = _within(round(high / 2, 1), (low, high)) if target is None else target[i]
+
+    def _add_sliders(self, size: int) -> None:
+        """Below the first, as many as a target has numbers; others are put away."""
+        with self._task:
+            for i in range(len(self._targets), size):
+                below = self._targets[0].order + i / 100
+                self._targets.append(self._gui.add_slider("Target", 0.0, 1.0, 0.1, 0.0, order=below))
+        for i, slider in enumerate(self._targets):
+            slider.visible = i < size
 
     def _any_task(self) -> TaskSpec:
         family = random.choice(list(self._ranges))
-        low, high = self._ranges[family]
-        target = 0.0
-        while abs(target) < FARTHEST_DRAWN * max(abs(low), abs(high)):
-            target = round(random.uniform(low, high), 1)
-        return TaskSpec(family, target)
+        box = self._ranges[family]
+        ends, far = list(zip(box.low, box.high, strict=True)), FARTHEST_DRAWN * np.array(box.largest)
+        for _ in range(TRIES):
+            target = [_within(round(random.uniform(*each), 1), each) for each in ends]
+            if np.any(np.abs(target) >= far):
+                return TaskSpec(family, tuple(target))
+        return TaskSpec(family, box.high)
 
 
-def _in_tenths(low: float, high: float) -> tuple[float, float]:
-    return math.ceil(10 * low) / 10, math.floor(10 * high) / 10
+def _in_tenths(box: Box) -> Box:
+    """Ends that a slider can be put to; those of the box where little is left between them."""
+    low = tuple(math.ceil(10 * end) / 10 for end in box.low)
+    high = tuple(math.floor(10 * end) / 10 for end in box.high)
+    return Box(low, high) if all(map(operator.lt, low, high)) else box
 
 
 def _push(button: str) -> Push:

@@ -14,7 +14,7 @@ from matplotlib.text import Text
 
 from rebody.agents.belief import Reading
 from rebody.inference.mixture.padded import MixturePrior
-from rebody.tasks import family_named
+from rebody.tasks import FamilySet
 from rebody.viewer import colours
 
 STDS = 2.0
@@ -69,8 +69,8 @@ def component(
 class LatentPicture:
     """Draws beliefs upon what does not change, which is drawn once."""
 
-    def __init__(self, latent: int, mixture: MixturePrior | None):
-        self._plane = plane_of(latent, mixture)
+    def __init__(self, latent: int, mixture: MixturePrior | None, families: FamilySet):
+        self._plane, self._known = plane_of(latent, mixture), families
         self._figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
         self._canvas = FigureCanvasAgg(self._figure)
         self._axes = self._figure.add_subplot()
@@ -98,7 +98,7 @@ class LatentPicture:
         for k, share in readings[-1].responsibilities.items():
             self._draw_cluster(k, share)
         freshness = np.linspace(1.0, 0.1, len(readings))[::-1]  # the newest is in full colour
-        families = [family_named(reading.family).colour for reading in readings]
+        families = [self._known.named(reading.family).colour for reading in readings]
         self._trail.set(offsets=points, sizes=4 + 20 * freshness**4, facecolors=[*map(to_rgba, families, freshness)])
         self._axes.draw_artist(self._trail)
         self._belief.set(**_outline(points[-1], self._plane.covariance(np.diag(readings[-1].latent.variance))))

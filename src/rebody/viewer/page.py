@@ -9,7 +9,7 @@ from collections.abc import Callable
 import viser
 
 from rebody.errors import RebodyError
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.controls import Choice, Controls, Offered, Order, Push, Restart
@@ -46,7 +46,7 @@ class Page:
         server.gui.main_panel.set_width(CONTROLS_PX)
         self.controls = Controls(server.gui, offered, choice)
         self.controls.show_task(trial, task)
-        self._panel = BeliefPanel(server.gui, trial.inference)
+        self._panel = BeliefPanel(server.gui, trial)
         self._server, self._load = server, load
         self._ended = threading.Event()
         self._first = (choice, trial, task)
@@ -69,8 +69,8 @@ class Page:
 
     def _watch(self, choice: Choice, session: Session) -> None:
         """Show that session, in place of the one before."""
-        self._scene = Scene(self._server, session.body.model)
-        self._panel.listen_to(session.trial.inference)
+        self._scene = Scene(self._server, session.body.model, session.trial.in_play)
+        self._panel.listen_to(session.trial)
         self.controls.show_task(session.trial, session.task)
         self._choice, self.session = choice, session
         self._begin()

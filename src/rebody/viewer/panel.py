@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import viser
 
-from rebody.agents.parts import Inference
+from rebody.evaluation.trial import Trial
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.latent import LatentPicture
@@ -18,30 +18,30 @@ PANEL_PX = 340
 class BeliefPanel:
     """Numbers, two plots over time, and the latent; a second tab explains it all."""
 
-    def __init__(self, gui: viser.GuiApi, inference: Inference):
+    def __init__(self, gui: viser.GuiApi, trial: Trial):
         panel = gui.add_panel()
         self._gui = gui
         self._tab = panel.add_tab("What it believes")
         with self._tab:
             self._numbers = gui.add_html("")
-            self._reached = ReachedPlot(gui)
-        self._listen_to(inference)
+        self._listen_to(trial)
         with panel.add_tab("What you see"):
-            gui.add_markdown(words.GUIDE)
+            self._guide = gui.add_markdown(words.guide(trial.inference.contract.families))
         panel.dock_left()
         panel.set_width(PANEL_PX)
 
-    def listen_to(self, inference: Inference) -> None:
-        """Show another module's beliefs from now on."""
-        if inference is not self._inference:
-            for part in (self._families, self._probabilities, self._latent):
+    def listen_to(self, trial: Trial) -> None:
+        """Show the beliefs of a trial's module from now on."""
+        if trial.inference is not self._inference or trial.in_play != self._known:
+            for part in (self._reached, self._families, self._probabilities, self._latent):
                 part.remove()
-            self._listen_to(inference)
+            self._listen_to(trial)
+            self._guide.content = words.guide(trial.inference.contract.families)
 
     def show(self, task: TaskSpec, moments: Sequence[Moment]) -> None:
         """All but the latent."""
-        self._numbers.content = words.numbers(task, moments[-1] if moments else None)
-        self._reached.show(moments, task.family)
+        self._numbers.content = words.numbers(self._known, task, moments[-1] if moments else None)
+        self._reached.show(moments, self._known.named(task.family))
         self._probabilities.show(moments)
 
     def show_latent(self, moments: Sequence[Moment]) -> None:
@@ -49,11 +49,12 @@ class BeliefPanel:
         picture = self._picture.draw([moment.reading for moment in moments])
         self._latent.content = words.picture(picture, "The latent, and the clusters in it")
 
-    def _listen_to(self, inference: Inference) -> None:
-        families, parts = tuple(inference.contract.target_ranges), inference.parts
-        self._inference = inference
-        self._picture = LatentPicture(parts.module.encoder.prior().mean.shape[-1], parts.mixture)
+    def _listen_to(self, trial: Trial) -> None:
+        families, parts = trial.inference.contract.families, trial.inference.parts
+        self._inference, self._known = trial.inference, trial.in_play
+        self._picture = LatentPicture(parts.module.encoder.prior().mean.shape[-1], parts.mixture, families)
         with self._tab:
+            self._reached = ReachedPlot(self._gui, self._known)
             self._families = self._gui.add_html(words.family_legend(families))
             self._probabilities = ProbabilityPlot(self._gui, families)
             self._latent = self._gui.add_html("")

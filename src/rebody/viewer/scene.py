@@ -9,7 +9,7 @@ import viser
 from jaxtyping import Float
 from mjviser import ViserMujocoScene
 
-from rebody.tasks import FAMILIES, GOAL, JUMP, STAND, VELOCITY, family_index
+from rebody.tasks import FamilySet
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import colours
 from rebody.viewer.session import Moment
@@ -18,9 +18,10 @@ WORLD = "/fixed_bodies"
 """mjviser's frame of all that stands still. It is moved under the body, which stays in the middle of the picture."""
 CAMERA, LOOKS_AT, FIELD_OF_VIEW = (0.0, -6.5, 1.8), (0.0, 0.0, 0.9), math.radians(42)
 EDGE_M = 2.0
-"""Goals farther away than this are off the picture: an arrow points to them [m]."""
+"""Places farther away than this are off the picture: an arrow points to them [m]."""
 ARROW_M = 0.5
-"""Length of an arrow: of one to a goal, and for every m/s of a speed [m]."""
+"""Length of an arrow: of one to a place, and for every m/s of a speed [m]."""
+SPEEDS = ("vx", "vy", "vz")
 RULER_M, RULER_LABELS = 2, 7
 """From one label on the floor to the next [m], and how many there are."""
 
@@ -28,7 +29,7 @@ RULER_M, RULER_LABELS = 2, 7
 class Scene:
     """Everything in the 3-D view, which follows the body along x."""
 
-    def __init__(self, server: viser.ViserServer, model: mujoco.MjModel):
+    def __init__(self, server: viser.ViserServer, model: mujoco.MjModel, families: FamilySet):
         server.scene.reset()
         camera = server.initial_camera
         camera.position, camera.look_at, camera.fov = CAMERA, LOOKS_AT, FIELD_OF_VIEW
@@ -36,9 +37,9 @@ class Scene:
         self._body = ViserMujocoScene(server, copy.copy(model), num_envs=1)  # it changes how its model is drawn
         self._body.camera_tracking_enabled = False
         self._ruler = Ruler(server.scene)
-        self._hidden = Mark(server.scene, "hidden", colours.HIDDEN, 1.8)
-        self._believed = Mark(server.scene, "believed", colours.BELIEVED, 1.5)
-        self._subgoal = Mark(server.scene, "subgoal", colours.SUBGOAL, 1.2)
+        self._hidden = Mark(server.scene, families, "hidden", colours.HIDDEN, 1.8)
+        self._believed = Mark(server.scene, families, "believed", colours.BELIEVED, 1.5)
+        self._subgoal = Mark(server.scene, families, "subgoal", colours.SUBGOAL, 1.2)
 
     def show_body(self, qpos: Float[np.ndarray, " nq"], x: float) -> None:
         """The body at these joint positions, the world moved so that x [m] is in the middle."""
@@ -60,10 +61,10 @@ class Scene:
 
 
 class Mark:
-    """A target: a pole where a goal is, an arrow for all else and to goals that are far away."""
+    """A target: a pole where a place is, an arrow for all else and to places that are far away."""
 
-    def __init__(self, scene: viser.SceneApi, name: str, colour: str, height: float):
-        self._name, self._height = name, height
+    def __init__(self, scene: viser.SceneApi, families: FamilySet, name: str, colour: str, height: float):
+        self._known, self._name, self._height = families, name, height
         shade = colours.rgb(colour)
         self._place = scene.add_frame(f"{WORLD}/{name}", show_axes=False, visible=False)
         behind = 0.4 * height  # the body's path; the higher the farther, so that none hides another
@@ -78,33 +79,37 @@ class Mark:
         if target is None:
             self._place.visible = self._arrow.visible = False
             return
-        family = family_index(target.family)
-        text = f"{self._name}: {target.family} {target.target:.1f} {FAMILIES[family].unit}"
-        is_near = family == GOAL and abs(target.target - x) <= EDGE_M
+        family = self._known.named(target.family)
+        text = f"{self._name}: {family.name} {', '.join(f'{n:.1f}' for n in target.target)} {family.unit}"
+        asked = dict(zip(family.quantity.components, target.target, strict=True))
+        is_near = "x" in asked and abs(asked["x"] - x) <= EDGE_M
         self._place.visible, self._arrow.visible = is_near, not is_near
         if is_near:
-            self._place.position = (target.target, 0.0, 0.0)
+            self._place.position = (asked["x"], asked.get("y", 0.0), 0.0)
             self._pole_label.text = text
         else:
-            start, along = _arrow(family, target.target, x)
+            start, along = _arrow(asked, x)
             start[2] += self._height
             self._arrow.points = np.array([[start, start + along]], np.float32)
             self._arrow_label.text, self._arrow_label.position = text, start
             self._arrow_label.anchor = "center-right" if along[0] >= 0 else "center-left"
 
 
-def _arrow(family: int, target: float, x: float) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
-    """Where an arrow begins, beside a body at x [m], and how it goes on [m]."""
+def _arrow(asked: dict[str, float], x: float) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """Where an arrow begins, beside a body at x [m], and how it goes on [m], for what is asked of its global state."""
     start = np.zeros(3)
-    if family == VELOCITY:
-        return start, np.array([ARROW_M * target, 0.0, 0.0])
-    if family == JUMP:
-        return start, np.array([0.0, 0.0, ARROW_M * target])
-    if family == STAND:
-        return start, np.array([math.sin(target), 0.0, math.cos(target)])
-    side = math.copysign(1.0, target - x)
-    start[0] = side * EDGE_M
-    return start, np.array([side * ARROW_M, 0.0, 0.0])
+    if "x" in asked:
+        side = math.copysign(1.0, asked["x"] - x)
+        start[0] = side * EDGE_M
+        return start, np.array([side * ARROW_M, 0.0, 0.0])
+    if asked.keys() & {*SPEEDS}:
+        return start, ARROW_M * np.array([asked.get(name, 0.0) for name in SPEEDS])
+    if asked.keys() & {"roll", "pitch"}:  # where the body's head is to be
+        roll, pitch = asked.get("roll", 0.0), asked.get("pitch", 0.0)
+        return start, np.array([math.cos(roll) * math.sin(pitch), -math.sin(roll), math.cos(roll) * math.cos(pitch)])
+    if "yaw" in asked:
+        return start, np.array([math.cos(asked["yaw"]), math.sin(asked["yaw"]), 0.0])
+    return start, np.array([0.0, asked.get("y", 0.0), asked.get("z", 0.0)])
 
 
 class Ruler:

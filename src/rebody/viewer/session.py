@@ -1,6 +1,5 @@
 """What the live page shows: a body, its agent and its hidden task, simulated a step at a time."""
 
-import math
 from collections import deque
 from dataclasses import dataclass
 
@@ -12,11 +11,13 @@ from rebody.agents.agent import Observation
 from rebody.agents.belief import Reading
 from rebody.agents.rollout import Drive
 from rebody.bodies import PointMasses, RobotBatch, Simulation
-from rebody.evaluation.evaluate import Trial, check_trial, trial_agent, trial_controller
+from rebody.control.places import reachable
+from rebody.evaluation.evaluate import trial_agent, trial_controller
+from rebody.evaluation.trial import Trial, check_trial
 from rebody.inputs import number
-from rebody.tasks import FAMILIES
+from rebody.ranges import Box
 from rebody.tasks.task_file import TaskSpec, active_tasks
-from rebody.types import DECISION_DT, GlobalState
+from rebody.types import DECISION_DT, AnyArray, GlobalState
 
 REMEMBERED_S = 20.0
 """How far back moments are kept [s]."""
@@ -29,8 +30,8 @@ class Moment:
     time_s: float
     task: TaskSpec
     """The hidden one."""
-    reached: dict[str, float]
-    """By family: the number that its targets are compared with [m, m/s, rad]."""
+    reached: dict[str, tuple[float, ...]]
+    """By family: what its targets are compared with [m, m/s, rad]."""
     reward: float
     reading: Reading
     """What the module believes. It listens beside an agent that does without it."""
@@ -62,7 +63,7 @@ class Session:
         """Back to x = 0; the agent forgets everything, the task stays."""
         self.body.reset(np.random.default_rng(seed))
         self._now = self._before = self._seen()
-        self._drive = Drive(self._agent, self._controller, self.body, self.trial.inference.contract.reward)
+        self._drive = Drive(self._agent, self._controller, self.body, self.trial.in_play)
         self._listener = self.trial.inference.begin(_fields(self.body.observe(), self.trial))
         self.moments.clear()
 
@@ -93,9 +94,10 @@ class Session:
         """Another hidden task from now on; only the oracle is told. RebodyError if the module cannot infer it
         or its target is no number; the task before then stays.
         """
-        number(task.target, "the target")
+        for each in task.target:
+            number(each, "the target")
         check_trial(self.trial, [task])
-        tasks = active_tasks([task], 1, DECISION_DT)
+        tasks = active_tasks([task], self.trial.in_play, 1, DECISION_DT)
         self._agent = trial_agent(self.trial, tasks)
         self.task, self._tasks = task, tasks
 
@@ -110,29 +112,30 @@ class Session:
     def _remember(self, heard: Observation) -> None:
         reading = self._listener.update(_fields(heard.state, self.trial), heard.reward[0])
         said = float(heard.reward[0]), reading, self._listener.doubts()
-        self.moments.append(Moment(self.time_s, self.task, _reached(heard.state), *said, self._subgoal()))
+        reached = {family.name: _numbers(family.quantity.read(heard.state)) for family in self.trial.in_play}
+        self.moments.append(Moment(self.time_s, self.task, reached, *said, self._subgoal()))
 
     def _subgoal(self) -> TaskSpec | None:
         subgoal = self._drive.command.subgoal
-        value = float(subgoal.value[0])
-        if self.trial.robot is None or not math.isfinite(value):
+        if self.trial.robot is None or not np.isfinite(subgoal.value).all():
             return None
-        return TaskSpec(FAMILIES[int(subgoal.slot[0])].name, value)
+        family = self.trial.in_play[subgoal.slot[0]]
+        return TaskSpec(family.name, _numbers(subgoal.value)[: family.size])
 
 
-def target_range(trial: Trial, family: str) -> tuple[float, float]:
-    """Smallest and largest target that the module has learned and the robot is able to reach (m, m/s, rad, m/s)."""
-    ends = trial.inference.contract.target_ranges[family]
-    return ends if trial.tracker is None else trial.tracker.tracker.reach.within(family, *ends)
+def target_range(trial: Trial, family: str) -> Box:
+    """Smallest and largest target that the module has learned and the robot is able to reach [m, m/s, rad]."""
+    reach = trial.tracker.tracker.families.ranges if trial.tracker else {}
+    return reachable(trial.inference.contract.families.named(family), reach.get(family))
 
 
 def fitting(trial: Trial, task: TaskSpec) -> TaskSpec:
     """That task, or the nearest that the module and the robot can be given."""
-    known = trial.inference.contract.target_ranges
-    family = task.family if task.family in known else next(iter(known))
-    low, high = target_range(trial, family)
-    target = task.target if family == task.family else high / 2
-    return TaskSpec(family, min(max(target, low), high))
+    known = trial.inference.contract.families
+    family = task.family if task.family in known else known.names[0]
+    box = target_range(trial, family)
+    target = task.target if len(task.target) == box.size and family == task.family else np.array(box.high) / 2
+    return TaskSpec(family, tuple(np.clip(target, box.low, box.high).tolist()))
 
 
 def _fields(state: GlobalState, trial: Trial) -> dict[str, float]:
@@ -140,5 +143,6 @@ def _fields(state: GlobalState, trial: Trial) -> dict[str, float]:
     return {field: float(getattr(state, field)[0]) for field in trial.inference.contract.fields}
 
 
-def _reached(state: GlobalState) -> dict[str, float]:
-    return {family.name: float(family.quantity.read(state)[0, 0]) for family in FAMILIES}
+def _numbers(vectors: AnyArray) -> tuple[float, ...]:
+    """The only one of vectors [1, size]."""
+    return tuple(np.asarray(vectors[0]).tolist())

@@ -4,13 +4,14 @@ import base64
 import html
 import io
 from collections.abc import Sequence
+from itertools import cycle
 
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image
 
 from rebody.names import AGENTS
-from rebody.tasks import FAMILIES, family_named
+from rebody.tasks import Family, FamilySet
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import colours
 from rebody.viewer.session import Moment, Session
@@ -19,11 +20,11 @@ INTRODUCTION = """
 The robot has a **hidden task**. All it hears is a reward: how far off it is. A module that learned on a point mass
 works out what is wanted. **Change the task, push the robot**, and watch.
 """
-GUIDE = f"""
-**In the middle.** The robot; the view follows it along *x*, drag to turn, scroll to zoom. Poles mark goals [m], arrows
-speeds [m/s], or point to a goal that is farther away than the picture shows.
+GUIDE = """
+**In the middle.** The robot; the view follows it along *x*, drag to turn, scroll to zoom. Poles mark places [m], arrows
+speeds [m/s], or point to a place that is farther away than the picture shows.
 
-**Black, dashed: the hidden task.** {"; ".join(f"*{family.name}*: {family.asks}" for family in FAMILIES)}.
+**Black, dashed: the hidden task.** {kinds}.
 
 **Red: the belief**, as a linear probe reads it from the module's latent, and how sure it is of the kind. It begins with
 a guess.
@@ -32,16 +33,22 @@ a guess.
 
 **Blue: the robot**, what it reaches.
 
-**Probability.** Which base task the module believes in: a kind, and whether its target is positive (solid) or negative
-(dashed).
+**Probability.** Which base task the module believes in: a kind, and the direction of its target (dashes).
 
 **Latent.** Each dot is a belief, ten per second, in the colour of the believed kind; the red ellipse is the newest
 one's uncertainty. Grey ellipses are clusters that the module found on the point mass, without labels. All ellipses
 reach two standard deviations.
 
-**Agents.** {"; ".join(f"*{name}*: {what}" for name, what in AGENTS.items())}. Whoever acts, the module listens, and its
-belief is what is drawn.
+**Agents.** {agents}. Whoever acts, the module listens, and its belief is what is drawn.
 """
+DASHES = ("solid", "dashed", "long dashes", "dotted")
+"""Lines of a family's last direction, the one before and so on, by turns."""
+
+
+def guide(families: FamilySet) -> str:
+    """All that is seen, where the module knows these families, as Markdown."""
+    kinds = "; ".join(f"*{family.name}*: {html.escape(family.label)}" for family in families)
+    return GUIDE.format(kinds=kinds, agents="; ".join(f"*{name}*: {what}" for name, what in AGENTS.items()))
 
 
 def dot(colour: str) -> str:
@@ -70,21 +77,27 @@ def _line(html_text: str) -> str:
     return f'<div style="font-size:.82em;padding:0 0 .3em 1em">{html_text}</div>'
 
 
-def family_legend(families: Sequence[str]) -> str:
+def family_legend(families: FamilySet) -> str:
     """Which line is which, as HTML."""
-    names = " &nbsp; ".join(dot(family_named(family).colour) + family for family in families)
-    return _line(f"Kind of task: {names} &nbsp; (dashed: negative)")
+    names = " &nbsp; ".join(dot(family.colour) + family.name for family in families)
+    directions = dict.fromkeys(family.direction_names[::-1] for family in families if family.directions)
+    lines = (", ".join(f"{dash}: {name}" for dash, name in zip(cycle(DASHES), each)) for each in directions)
+    return _line(f"Kind of task: {names} &nbsp; " + " &nbsp; ".join(f"({line})" for line in lines))
 
 
-def numbers(task: TaskSpec, moment: Moment | None) -> str:
+def numbers(families: FamilySet, task: TaskSpec, moment: Moment | None) -> str:
     """The numbers of this moment, in the colours of the plots, as HTML."""
+
+    def named(family: str, target: Sequence[float]) -> str:
+        return f"{family} {value(families.named(family), target)}"
+
     rows = [(colours.HIDDEN, "hidden task", named(task.family, task.target))]
     believed = reached = "nothing yet"
     if moment is not None:
         reading = moment.reading
         chance = reading.probabilities[reading.family]
         believed = f"{named(reading.family, reading.target)} ({100 * chance:.0f} % sure)"
-        reached = value(task.family, moment.reached[task.family])
+        reached = value(families.named(task.family), moment.reached[task.family])
     rows += [(colours.BELIEVED, "believed", believed), (colours.ROBOT, "robot", reached)]
     if moment is not None and moment.subgoal is not None:
         rows.append((colours.SUBGOAL, "subgoal", named(moment.subgoal.family, moment.subgoal.target)))
@@ -102,11 +115,6 @@ def picture(pixels: UInt8[np.ndarray, "height width 3"], says: str) -> str:
     return f'<img alt="{says}" decoding="sync" style="{style}" src="data:image/png;base64,{data}">'
 
 
-def named(family: str, target: float) -> str:
-    """A task in words."""
-    return f"{family} {value(family, target)}"
-
-
-def value(family: str, number: float) -> str:
-    """A number with its unit."""
-    return f"{number:+.2f} {family_named(family).unit}"
+def value(family: Family, target: Sequence[float]) -> str:
+    """Numbers with their unit, as HTML."""
+    return f"{', '.join(f'{number:+.2f}' for number in target)} {html.escape(family.unit)}"

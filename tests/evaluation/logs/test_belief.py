@@ -10,7 +10,6 @@ from rebody.agents.build import build_agent
 from rebody.agents.parts import load_inference
 from rebody.agents.rollout import rollout_on_toy
 from rebody.evaluation.logs import believe, read_log, resample, save_beliefs
-from rebody.tasks import FAMILIES, GOAL, VELOCITY
 from rebody.types import Task
 
 DECISIONS = 60
@@ -24,10 +23,11 @@ def module():
 @pytest.fixture(scope="module")
 def episodes(module):
     """A point mass whose task changes half-way."""
-    late = np.arange(DECISIONS)[:, None] >= DECISIONS // 2
-    task = Task(np.where(late, VELOCITY, GOAL).astype(np.int32), np.where(late, -2.0, 5.0).astype(np.float32))
+    late, families = np.arange(DECISIONS)[:, None] >= DECISIONS // 2, module.contract.families
+    family = np.where(late, families.index("velocity"), families.index("goal")).astype(np.int32)
+    task = Task(family, np.where(late, -2.0, 5.0).astype(np.float32)[..., None])
     agent = build_agent("reuse", module, horizon=2)
-    episodes = rollout_on_toy(agent, module.toy, task, module.contract.reward)
+    episodes = rollout_on_toy(agent, module.toy, task, families)
     return jax.tree.map(lambda leaf: np.asarray(leaf)[:, 0], (episodes.state, episodes.reward, episodes.belief))
 
 
@@ -57,8 +57,12 @@ def assert_as_the_agent(run, module, episodes):
     _, _, of_agent = episodes
     family, target = module.parts.probe(of_agent)
     np.testing.assert_allclose(run.latent, of_agent.mean, atol=5e-4 * np.abs(of_agent.mean).max())
-    np.testing.assert_allclose(run.targets, target, atol=2e-3)
-    assert [reading.family for reading in run.readings] == [FAMILIES[i].name for i in np.asarray(family)]
+    np.testing.assert_allclose([reading.target for reading in run.readings], target, atol=2e-3)
+    assert [reading.family for reading in run.readings] == [module.contract.families[i].name for i in family]
+    for each in module.contract.families:
+        own = run.believes(each)
+        np.testing.assert_allclose(run.targets(each)[own], np.asarray(target)[own], atol=2e-3)
+        assert np.isnan(run.targets(each)[~own]).all()
 
 
 def test_of_a_log_with_a_row_per_decision(believed, module, episodes):
@@ -81,9 +85,9 @@ def test_of_a_finer_log(believed, module, episodes):
 
 def test_finds_the_tasks_and_when_they_changed(believed, episodes):
     run = believed(**columns_of(episodes))
-    assert run.families == ("goal", "velocity")
-    assert run.believes("goal")[15:29].all()
-    assert run.targets[25] == pytest.approx(5.0, abs=0.25)
+    assert run.families.names == ("goal", "velocity")
+    assert run.believes(run.families.named("goal"))[15:29].all()
+    assert run.targets(run.families.named("goal"))[25] == pytest.approx(5.0, abs=0.25)
     conclusion = run.conclusion()
     assert conclusion.startswith("believes at 6.0 s: velocity -")
     since = float(conclusion.split("velocity since ")[1].split()[0])
@@ -102,8 +106,8 @@ def test_the_table_holds_what_was_heard_and_believed(believed, episodes, tmp_pat
         assert float(row["position_m"]) == pytest.approx(state.x[i], abs=1e-5)
         assert float(row["reward"]) == pytest.approx(reward[i], abs=1e-5)
         assert row["inferred_family"] == reading.family
-        assert float(row["inferred_target"]) == pytest.approx(reading.target, abs=1e-5)
-        assert sum(float(row[f"probability_{name}"]) for name in run.families) == pytest.approx(1.0, abs=1e-4)
+        assert float(row["inferred_target"]) == pytest.approx(reading.target[0], abs=1e-5)
+        assert sum(float(row[f"probability_{name}"]) for name in run.families.names) == pytest.approx(1.0, abs=1e-4)
         assert float(row[f"latent_{run.latent.shape[1]}"]) == pytest.approx(reading.latent.mean[-1], abs=1e-5)
         assert [float(row[f"cluster_{k}"]) for k in reading.responsibilities] == pytest.approx(
             list(reading.responsibilities.values()), abs=1e-5

@@ -1,13 +1,18 @@
 """What can be read and is odd is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rebody.evaluation.logs import doubts, resample
 from rebody.inference.contract import Contract
+from rebody.ranges import Box, interval
+from rebody.tasks import FamilySet, Quantity
+from rebody.tasks.line import GOAL, STAND, VELOCITY
 
 FIELDS = ("x", "vx")
-CONTRACT = Contract(FIELDS, 32, {"goal": (-15.0, 15.0), "velocity": (-3.0, 3.0)}, "relative")
+CONTRACT = Contract(FIELDS, 32, FamilySet((GOAL, VELOCITY)))
 TIME = 0.05 * np.arange(41)
 
 
@@ -53,7 +58,19 @@ def test_places_in_millimetres(said):
 
 
 def test_degrees(said):
-    contract = Contract(("pitch",), 32, {"stand": (-1.5, 1.5)}, "relative")
+    contract = Contract(("pitch",), 32, FamilySet((STAND.within(interval(-1.5, 1.5)),)))
     assert said(contract, pitch_rad=0.9 * np.sin(TIME)) == []
     (doubt,) = said(contract, pitch_rad=45 * TIME)
     assert doubt.startswith("pitch_rad reaches")
+
+
+def test_each_number_of_a_vector_has_a_range_of_its_own(said):
+    """A place of the floor, which is as far as a speed along it leads in an episode."""
+    place = replace(
+        GOAL, name="place", quantity=Quantity("x_pitch", ("x", "pitch"), "m, rad", "place and pitch"),
+        targets=(Box((-15.0, -0.5), (12.0, 0.4)),), directions=(),
+    )  # fmt: skip
+    contract = Contract(("x", "pitch"), 32, FamilySet((place,)))
+    assert said(contract, pitch_rad=0.7 * np.sin(TIME)) == []
+    (doubt,) = said(contract, pitch_rad=45 * TIME)
+    assert "the module learned place from -15 to 12 and -0.5 to 0.4 m, rad" in doubt

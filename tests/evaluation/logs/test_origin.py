@@ -5,8 +5,11 @@ import pytest
 
 from rebody.evaluation.logs import begun_at_zero
 from rebody.inference.contract import Contract
+from rebody.ranges import interval
+from rebody.tasks import FamilySet
+from rebody.tasks.line import GOAL, VELOCITY
 
-CONTRACT = Contract(("x", "vx"), 32, {"goal": (-15.0, 12.0), "velocity": (-3.0, 3.0)}, "relative")
+CONTRACT = Contract(("x", "vx"), 32, FamilySet((GOAL.within(interval(-15.0, 12.0)), VELOCITY)))
 TIME = 0.05 * np.arange(41)
 
 
@@ -29,13 +32,13 @@ def test_within_them_nothing_changes(start, log):
 
 
 def test_a_module_without_goals(log):
-    contract = Contract(("vx",), 32, {"velocity": (-3.0, 3.0)}, "relative")
+    contract = Contract(("vx",), 32, FamilySet((VELOCITY,)))
     assert begun_at_zero(log(("vx",), position_m=14 + TIME), contract).notes == ()
     assert begun_at_zero(log(("vx",), position_m=16 + TIME), contract).fields["x"][0] == 0.0
 
 
 def test_a_side_position(log):
-    contract = Contract(("x", "y"), 32, {"goal": (-15.0, 15.0)}, "relative")
+    contract = Contract(("x", "y"), 32, FamilySet((GOAL,)))
     shifted = begun_at_zero(log(("x", "y"), position_y_m=-200 + TIME), contract)
     np.testing.assert_allclose(shifted.fields["y"], TIME, atol=1e-9)
     assert shifted.notes[0].startswith("position_y_m begins at -200 m")

@@ -59,7 +59,7 @@ def artifact(tmp_path_factory) -> Path:
 def written(trial, artifact, tmp_path_factory) -> Written:
     """One page of a tracker and of a folder with a diagnosis, a figure and a film."""
     demo = tmp_path_factory.mktemp("page") / "demo"
-    tasks = [TaskSpec("goal", 2.5), TaskSpec("goal", -1.0, Switch(1.0, "goal", 1.5))]
+    tasks = [TaskSpec("goal", (2.5,)), TaskSpec("goal", (-1.0,), Switch(1.0, "goal", (1.5,)))]
     results = diagnose(trial, tasks, 1, lambda agent: None).results
     for agent, of in results.items():
         save_results(of, demo / f"{agent}.json")

@@ -4,21 +4,35 @@ import re
 
 import pytest
 
-from rebody.report.page.curves import LEFT_OUT, PANELS, learning_curves
+from rebody.report.page.curves import LEFT_OUT, learning_curves, panels_of
 from rebody.store import load_artifact, shipped_artifacts
 from rebody.training.run import read_log
 
-KNOWN = [column for each in PANELS for column in each.columns]
+
+def known(log=()):
+    return [column for each in panels_of(log, {}) for column in each.columns]
 
 
 def test_a_column_is_drawn_once():
-    assert len(KNOWN) == len(set(KNOWN))
-    assert not set(KNOWN) & set(LEFT_OUT)
+    columns = known([f"evaluation/{name} {of}" for name in ("goal", "place") for of in ("median", "p95", "R2")])
+    assert len(columns) == len(set(columns))
+    assert not set(columns) & set(LEFT_OUT)
 
 
 @pytest.mark.parametrize("name", [name for name, _ in shipped_artifacts()])
 def test_every_measurement_of_training_has_its_axes(name):
-    assert read_log(load_artifact(name).log).keys() <= {*KNOWN, *LEFT_OUT}
+    log = read_log(load_artifact(name).log)
+    assert log.keys() <= {*known(log), *LEFT_OUT}
+
+
+def test_families_of_a_users_own_are_drawn_in_their_unit():
+    log = read_log("iteration,evaluation/lean median,evaluation/lean p95,evaluation/goal median\n1,2.0,3.0,4.0\n")
+    settings = {"training": {"families": [{"name": "lean", "quantity": {"unit": "m, rad"}}, "odd", None]}}
+    drawn = learning_curves(log, settings)
+    assert list(drawn) == ["final error: lean", "final error: goal"]
+    assert "error [m, rad]" in drawn["final error: lean"]
+    assert "error [m]" in drawn["final error: goal"]  # as it ships
+    assert "error [" not in learning_curves(log)["final error: lean"]
 
 
 def test_what_was_never_measured_is_not_drawn():

@@ -10,12 +10,12 @@ from rebody.agents.parts import load_inference, load_slots
 from rebody.bodies.toys import Randomisation
 from rebody.cli.main import run
 from rebody.store import load_artifact, tree_hash
-from rebody.tasks import GOAL, STAND, VELOCITY
 from rebody.training.classifier import ClassifierConfig
 from rebody.training.classifier.train import Beliefs, cross_entropy, initial_state, iterate
 from rebody.training.inference.episodes import ToyWorld
 from rebody.types import Belief
 
+GOAL, VELOCITY, STAND = range(3)
 FLAGS = "--episodes 4 --decisions 30 --held-out 6 --iterations 3 --updates 2 --batch-size 8 --hidden 4"
 
 
@@ -33,7 +33,7 @@ def module(full_module):
 
 def test_what_was_trained_serves_the_module(folder, module):
     loaded = load_slots(str(folder))
-    assert loaded.parts.classifier.families == (GOAL, VELOCITY, STAND)
+    assert loaded.families == ("goal", "velocity", "stand")
     assert loaded.parts.of_cluster.shape == module.parts.mixture.active.shape
     assert set(np.asarray(loaded.parts.of_cluster)) <= {GOAL, VELOCITY, STAND}
     assert slot_chooser(module, loaded, "classifier") is loaded.parts.classifier
@@ -58,9 +58,9 @@ def test_a_module_of_one_family_needs_none(own_module, tmp_path, capsys):
 def test_the_world_is_the_modules_own(full_module):
     world = ToyWorld.of(load_artifact(str(full_module), "inference"))
     assert world.randomisation == Randomisation()
-    assert {base_task.family for base_task in world.tasks.base_tasks} == {"goal", "velocity", "stand"}
+    assert world.families.names == ("goal", "velocity", "stand")
     tasks, disturbance = world.draw(jax.random.key(0), 50, 200, 0.0, disturbed=True)
-    assert tasks.target.shape == (200, 50)
+    assert tasks.target.shape == (200, 50, 1)
     assert np.abs(tasks.target[tasks.family == GOAL]).min() >= 2.0
     assert float(disturbance.ripple_amplitude.max()) > 0.3
     _, calm = world.draw(jax.random.key(0), 50, 200, 0.0, disturbed=False)

@@ -6,7 +6,8 @@ import pytest
 from rebody.bodies.toys import MassDamper
 from rebody.control.sac import SACConfig
 from rebody.inference import InferenceConfig
-from rebody.tasks import BaseTask, TaskDistribution
+from rebody.tasks import FamilySet
+from rebody.tasks.line import GOAL, both_ways
 from rebody.training.inference import MetaConfig
 from rebody.training.inference.train import initial_state
 
@@ -14,8 +15,7 @@ from rebody.training.inference.train import initial_state
 @pytest.fixture(scope="session")
 def config():
     return MetaConfig(
-        tasks=TaskDistribution((BaseTask("goal", 0.0, 10.0), BaseTask("goal", -10.0, 0.0))),
-        reward="plain",
+        families=FamilySet((GOAL.within(*both_ways(0.0, 10.0), law="plain"),)),
         inference=InferenceConfig(window=4, units=8, batch_size=300, decoded=3, reward_scale=10.0),
         sac=SACConfig(hidden=(8, 8), batch_size=300),
         policy_fields=("x", "vx"),

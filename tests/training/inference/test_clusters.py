@@ -9,18 +9,22 @@ import pytest
 
 from rebody.errors import RebodyError
 from rebody.inference.mixture.padded import no_clusters
-from rebody.tasks import GOAL, VELOCITY
+from rebody.tasks import FamilySet
+from rebody.tasks.line import GOAL as GOALS
+from rebody.tasks.line import VELOCITY as SPEEDS
 from rebody.training.inference.clusters import agreement, draw, new_mixture, refit, sample_beliefs
 from rebody.training.inference.config import MixtureConfig
 from rebody.training.inference.episodes import Episodes
 from rebody.types import Belief, Task, global_state
 
+GOAL, VELOCITY = range(2)
 CENTRES = np.array([[-4.0, 0.0], [4.0, 0.0], [0.0, 6.0]])
 
 
 @pytest.fixture
 def settings(config):
-    return replace(config, prior="mixture", mixture=MixtureConfig(points=80, from_decision=2, maximum=8))
+    families, mixture = FamilySet((GOALS, SPEEDS)), MixtureConfig(points=80, from_decision=2, maximum=8)
+    return replace(config, families=families, prior="mixture", mixture=mixture)
 
 
 def episodes_at(centres, config, seed=0):
@@ -31,9 +35,9 @@ def episodes_at(centres, config, seed=0):
     kind = np.arange(config.episodes) % len(centres)
     mean = centres[kind][:, None] + np.random.default_rng(seed).normal(0.0, 0.1, (shape[0], shape[1] + 1, 2))
     still = jnp.zeros(mean.shape[:2])
-    task = Task(family[kind], target[kind])
+    task = Task(jnp.broadcast_to(family[kind, None], shape), jnp.broadcast_to(target[kind, None, None], (*shape, 1)))
     return Episodes(
-        task=jax.tree.map(lambda leaf: jnp.broadcast_to(leaf[:, None], shape), task),
+        task=task,
         state=global_state(x=still),
         belief=Belief(jnp.asarray(mean, jnp.float32), jnp.full(mean.shape, 0.03)),
         action=jnp.zeros((*shape, 1)),
@@ -101,8 +105,8 @@ def test_the_label_of_a_belief_is_that_of_the_decision_before_it(settings):
     """The task of its newest transition: in these episodes, another one at every decision."""
     switching = numbered(settings)
     sign = jnp.where(jnp.arange(settings.decisions) % 2, 1.0, -1.0)
-    target = jnp.broadcast_to(sign, switching.task.target.shape)
-    switching = replace(switching, task=Task(jnp.full(target.shape, VELOCITY), target))
+    target = jnp.broadcast_to(sign[:, None], switching.task.target.shape)
+    switching = replace(switching, task=Task(jnp.full(target.shape[:-1], VELOCITY), target))
     latent, label = sample_beliefs(switching, settings, np.random.default_rng(0))
     time = np.rint(latent[:, 1]).astype(int)
     np.testing.assert_array_equal(label, 2 * VELOCITY + (time - 1) % 2)

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from rebody.bodies.toys import FullToy, MassDamper, Randomisation, make_toy
-from rebody.tasks import GOAL, STAND, BaseTask, TaskDistribution, reward
+from rebody.ranges import interval
+from rebody.tasks import FamilySet
+from rebody.tasks.line import GOAL, STAND
 from rebody.training.inference.episodes import collect, refresh_beliefs, roles
 from rebody.training.inference.train import initial_state
 from rebody.types import Transition
@@ -36,7 +38,8 @@ def test_roles_are_quarters(config):
 
 def test_episodes_are_what_learning_expects(episodes, config):
     shape = (config.episodes, config.decisions)
-    assert episodes.reward.shape == episodes.task.family.shape == episodes.task.target.shape == shape
+    assert episodes.reward.shape == episodes.task.family.shape == shape
+    assert episodes.task.target.shape == (*shape, 1)
     assert episodes.action.shape == (*shape, 1)
     assert episodes.state.x.shape == (shape[0], shape[1] + 1)
     assert episodes.belief.mean.shape == (shape[0], shape[1] + 1, config.inference.latent)
@@ -52,8 +55,8 @@ def test_one_hidden_task_explains_all_rewards_of_an_episode(episodes):
     targets = np.where(misses[0] < misses[1], *first[..., 0])
     assert (np.abs(targets) <= 10).all()
     assert len(set(targets.round(3))) == len(targets)
-    np.testing.assert_allclose(episodes.task.target, np.broadcast_to(targets[:, None], x.shape), atol=1e-4)
-    np.testing.assert_array_equal(episodes.task.family, np.full(x.shape, GOAL))
+    np.testing.assert_allclose(episodes.task.target[..., 0], np.broadcast_to(targets[:, None], x.shape), atol=1e-4)
+    np.testing.assert_array_equal(episodes.task.family, np.zeros(x.shape))
 
 
 def test_each_decision_is_paid_for_the_task_that_is_on(config, state):
@@ -65,11 +68,11 @@ def test_each_decision_is_paid_for_the_task_that_is_on(config, state):
         )
         for share in (1.0, 0.0)
     )  # fmt: skip
-    changes = np.diff(switching.task.target, axis=1) != 0
+    changes = np.diff(switching.task.target[..., 0], axis=1) != 0
     np.testing.assert_array_equal(changes.sum(axis=1), np.ones(8))
     assert len(set(np.nonzero(changes)[1])) > 2
     after = jax.tree.map(lambda leaf: leaf[:, 1:], switching.state)
-    np.testing.assert_allclose(switching.reward, reward(switching.task, after, config.reward), rtol=1e-5)
+    np.testing.assert_allclose(switching.reward, config.families.reward(switching.task, after), rtol=1e-5)
     np.testing.assert_array_equal(switching.action, steady.action)  # wanderers do not listen
     np.testing.assert_array_equal(switching.task.target[:, 0], steady.task.target[:, 0])
     before = np.cumsum(changes, axis=1) == 0
@@ -175,8 +178,8 @@ def standing(config):
     """Settings of the full toy, which stands at a pitch."""
     inference = replace(config.inference, fields=("x", "pitch"), scales=(10.0, 1.5), window=None, latent=3, kinds=1)
     fields = {"policy_fields": ("x", "pitch", "pitch_rate"), "policy_scales": (10.0, 1.5, 3.0)}
-    tasks = TaskDistribution((BaseTask("stand", 0.5, 1.5), BaseTask("goal", -9.0, -1.0)))
-    return replace(config, inference=inference, tasks=tasks, toy="full", **fields)
+    stand, goal = STAND.within(interval(0.5, 1.5), law="plain"), GOAL.within(interval(-9.0, -1.0), law="plain")
+    return replace(config, inference=inference, families=FamilySet((goal, stand)), toy="full", **fields)
 
 
 @pytest.fixture(scope="module")
@@ -191,10 +194,10 @@ def test_the_full_toy_acts_in_three_ways_and_is_paid_for_its_pitch(stood, standi
     _, episodes = stood
     assert episodes.action.shape == (8, standing.decisions, 3)
     assert np.std(episodes.action, axis=(0, 1)).min() > 0.1
-    assert set(np.asarray(episodes.task.family).ravel()) == {GOAL, STAND}
+    assert set(np.asarray(episodes.task.family).ravel()) == {0, 1}
     after = jax.tree.map(lambda leaf: leaf[:, 1:], episodes.state)
-    achieved = np.where(episodes.task.family == STAND, after.pitch, after.x)
-    np.testing.assert_allclose(episodes.reward, -np.abs(achieved - episodes.task.target), rtol=1e-4, atol=1e-5)
+    achieved = np.where(episodes.task.family == 1, after.pitch, after.x)
+    np.testing.assert_allclose(episodes.reward, -np.abs(achieved - episodes.task.target[..., 0]), rtol=1e-4, atol=1e-5)
     assert not np.asarray(episodes.state.z).min() < 0
     assert np.asarray(episodes.state.z).max() > 0
 

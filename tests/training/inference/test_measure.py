@@ -9,7 +9,9 @@ import pytest
 from rebody.agents.rollout import Episodes
 from rebody.bodies.toys import FullToy, MassDamper, describe_toy
 from rebody.inference.probe import Probe
-from rebody.tasks import GOAL, VELOCITY, BaseTask, TaskDistribution, base_task
+from rebody.ranges import interval
+from rebody.tasks import FamilySet, line
+from rebody.tasks.line import both_ways
 from rebody.training.inference import measure
 from rebody.training.inference.config import MixtureConfig
 from rebody.training.inference.measure import Outcome, act, contract_of, fit, is_right, measure_in_depth, read
@@ -23,27 +25,36 @@ def parts(config, state):
     return trained_parts(state, config)
 
 
+GOAL, VELOCITY = range(2)
+FAMILIES = FamilySet(
+    (
+        line.GOAL.within(*both_ways(2.0, 9.0), law="plain"),
+        line.VELOCITY.within(*both_ways(1.0, 3.0), law="plain"),
+    )
+)
 TOLD = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]], np.float32)
-PROBE = Probe(np.array([GOAL, VELOCITY]), np.array([[-1.0, 1.0], [0.0, 0.0], [0.0, 0.0]], np.float32), TOLD)
+PROBE = Probe(np.array([[-1.0, 1.0], [0.0, 0.0], [0.0, 0.0]], np.float32), TOLD, FAMILIES)
 """Reads the family from the sign of the first number of a latent, the target from the second."""
 
 
 def latent_of(family, target):
     """What `PROBE` reads as this task."""
-    return np.stack(np.broadcast_arrays(np.where(family == VELOCITY, 1.0, -1.0), target), axis=-1).astype(np.float32)
+    kind = np.where(family == VELOCITY, 1.0, -1.0)
+    return np.stack(np.broadcast_arrays(kind, target[..., 0]), axis=-1).astype(np.float32)
 
 
 def outcome_of(tasks, latent, variance=1e-8, **fields):
     """Episodes with these beliefs; fields of the state and `reward` that are not given are 0."""
-    still = np.zeros(tasks.target.shape, np.float32)
+    still = np.zeros(tasks.family.shape, np.float32)
     state = GlobalState(**{name: np.asarray(fields.get(name, still), np.float32) for name in GLOBAL_FIELDS})
     return Outcome(
+        FAMILIES,
         tasks,
         Episodes(
             state=state,
             reward=fields.get("reward", still),
             belief=Belief(latent, np.full_like(latent, variance)),
-            subgoal=Subgoal(tasks.family, still),
+            subgoal=Subgoal(tasks.family, still[..., None]),
             fell=np.zeros(still.shape[1], bool),
         ),
     )
@@ -54,13 +65,13 @@ def lasting(families, targets, time):
     shape = (time, len(families))
     return Task(
         np.broadcast_to(np.asarray(families, np.int32), shape).copy(),
-        np.broadcast_to(np.asarray(targets, np.float32), shape).copy(),
+        np.broadcast_to(np.asarray(targets, np.float32)[:, None], (*shape, 1)).copy(),
     )
 
 
 def test_a_reading_is_right_when_family_and_sign_are():
     tasks = lasting([GOAL, GOAL, VELOCITY, VELOCITY, GOAL], [3.0, 3.0, -1.0, -1.0, 3.0], 1)
-    says = Task(np.array([[GOAL, GOAL, VELOCITY, GOAL, VELOCITY]]), np.array([[9.0, -3.0, -0.1, -1.0, 3.0]]))
+    says = Task(np.array([[GOAL, GOAL, VELOCITY, GOAL, VELOCITY]]), np.array([[9.0, -3.0, -0.1, -1.0, 3.0]])[..., None])
     outcome = outcome_of(tasks, latent_of(says.family, says.target))
     family, target = read(PROBE, outcome)
     np.testing.assert_array_equal(family, says.family)
@@ -77,7 +88,7 @@ def changing():
     is_late = np.arange(51)[:, None] >= CHANGES_AT
     tasks = Task(
         np.where(is_late, [[VELOCITY, GOAL]], GOAL).astype(np.int32),
-        np.where(is_late, [[2.0, -6.0]], [[5.0, 5.0]]).astype(np.float32),
+        np.where(is_late, [[2.0, -6.0]], [[5.0, 5.0]]).astype(np.float32)[..., None],
     )
     says = jax.tree.map(lambda leaf: np.concatenate([leaf[:1].repeat(LATE - 1, axis=0), leaf[: -LATE + 1]]), tasks)
     return outcome_of(tasks, latent_of(says.family, says.target))  # it takes three decisions to notice
@@ -123,13 +134,11 @@ def test_the_median_is_over_changes(changing):
 
 def test_another_target_of_the_same_base_task_is_no_new_one(changing):
     tasks = changing.tasks
-    farther = Task(tasks.family, np.where(np.arange(51)[:, None] > 35, 1.5 * tasks.target, tasks.target))
+    farther = Task(tasks.family, np.where(np.arange(51)[:, None, None] > 35, 1.5 * tasks.target, tasks.target))
     latent = changing.episodes.belief.mean
     assert measure._changes(PROBE, outcome_of(farther, latent)) == measure._changes(PROBE, changing)
 
 
-GOALS_AND_SPEEDS = TaskDistribution((BaseTask("goal", 2.0, 9.0), BaseTask("goal", -9.0, -2.0),
-                                     BaseTask("velocity", 1.0, 3.0), BaseTask("velocity", -3.0, -1.0)))  # fmt: skip
 TIME = 60
 
 
@@ -138,7 +147,7 @@ def settings(config):
     """Goals and speeds with a mixture."""
     inference = replace(config.inference, fields=("x", "vx"), scales=(10.0, 3.0), kinds=0)
     mixture = MixtureConfig(maximum=8)
-    return replace(config, tasks=GOALS_AND_SPEEDS, inference=inference, prior="mixture", mixture=mixture)
+    return replace(config, families=FAMILIES, inference=inference, prior="mixture", mixture=mixture)
 
 
 def known(size, seed=0):
@@ -160,17 +169,17 @@ def clairvoyant(settings, monkeypatch):
         calls.append((kind, options))
         tasks = known(held_out, options.get("seed", 2))
         if options.get("switch_share"):
-            tasks = jax.tree.map(lambda leaf: np.where(np.arange(TIME)[:, None] < 30, leaf, np.roll(leaf, 1, 1)), tasks)
+            tasks = jax.tree.map(lambda leaf: np.concatenate([leaf[:30], np.roll(leaf[30:], 1, 1)]), tasks)
         latent = latent_of(tasks.family, tasks.target)
         latent[..., 1] += 0.25 if options.get("disturbed") else 0.0
         latent[: measure.BASE_TASK_AT - 1] *= -1  # it knows nothing before
-        off = np.linspace(0.0, 0.3, held_out)
+        off, target = np.linspace(0.0, 0.3, held_out), tasks.target[..., 0]
         fields = {
-            "x": np.where(tasks.family == GOAL, tasks.target + off, 0.1 * np.arange(TIME)[:, None] * tasks.target),
-            "vx": np.where(tasks.family == GOAL, 0.0, tasks.target),
+            "x": np.where(tasks.family == GOAL, target + off, 0.1 * np.arange(TIME)[:, None] * target),
+            "vx": np.where(tasks.family == GOAL, 0.0, target),
         }
         paid = {"reuse": -2.0, "oracle": -1.0, "bayes": -1.5}[kind]
-        return outcome_of(tasks, latent, reward=np.full(tasks.target.shape, paid, np.float32), **fields)
+        return outcome_of(tasks, latent, reward=np.full(tasks.family.shape, paid, np.float32), **fields)
 
     monkeypatch.setattr(measure, "act", acts)
     return calls
@@ -218,16 +227,16 @@ def test_without_a_mixture_there_are_no_clusters(clairvoyant, parts, settings):
     assert not [name for name in figures if "beliefs" in name]
 
 
-def test_a_target_is_as_sharp_as_at_its_decision(settings):
+def test_a_target_is_as_sharp_as_at_its_decision():
     tasks = known(8)
     latent = latent_of(tasks.family, tasks.target)
     off = np.where(tasks.family == GOAL, 0.5, -0.125)
     latent[..., 1] += np.where(np.arange(TIME)[:, None] == measure.SHARP_AT, off, 9.0)
-    figures = measure._sharpness(PROBE, outcome_of(tasks, latent), settings)
+    figures = measure._sharpness(PROBE, outcome_of(tasks, latent))
     assert figures == pytest.approx({"goal read, disturbed": 0.5, "velocity read, disturbed": 0.125}, abs=1e-5)
 
 
-def test_readings_are_judged_at_their_decisions(settings):
+def test_readings_are_judged_at_their_decisions():
     """Of four episodes one is read wrongly at the tenth decision; goals are read as half of what they are."""
     tasks = known(4)
     latent = latent_of(tasks.family, tasks.target)
@@ -235,11 +244,11 @@ def test_readings_are_judged_at_their_decisions(settings):
     latent[: measure.PROBED_FROM, :, 1] *= 100
     latent[measure.BASE_TASK_AT - 1, 2, 1] *= -1
     latent[measure.PROBED_FROM :: 2, 0] *= -1  # and one later on, family and sign, at every other decision
-    figures = measure._readings(PROBE, outcome_of(tasks, latent), settings)
+    figures = measure._readings(PROBE, outcome_of(tasks, latent))
     assert (figures["base task"], figures["base task later"]) == (0.75, 0.875)
     assert figures["velocity R2"] == pytest.approx(1.0, abs=1e-5)
     latent[measure.PROBED_FROM :: 2, 0] *= -1
-    assert measure._readings(PROBE, outcome_of(tasks, latent), settings)["goal R2"] == pytest.approx(0.75, abs=1e-5)
+    assert measure._readings(PROBE, outcome_of(tasks, latent))["goal R2"] == pytest.approx(0.75, abs=1e-5)
 
 
 def test_a_probe_is_fitted_on_what_is_believed_late(clairvoyant, parts, settings):
@@ -269,7 +278,7 @@ def test_clusters_of_beliefs_that_lie_about_known_points(settings, monkeypatch, 
     """One point for each base task; one for each family; one for each direction."""
     monkeypatch.setattr(measure, "CLUSTERED", (300, 100_000))
     tasks = known(40)
-    latent = np.array(centres, np.float32)[np.asarray(base_task(tasks))]
+    latent = np.array(centres, np.float32)[FAMILIES.base_task(tasks)]
     latent[: measure.PROBED_FROM] = 50.0  # before, they are elsewhere
     figures = measure._clusters(outcome_of(tasks, latent, variance=0.04), settings)
     for size in (300, 100_000):
@@ -290,21 +299,21 @@ def assert_same(one, other):
 def test_held_out_tasks_are_the_same_for_every_agent(parts, short):
     outcomes = {kind: act(kind, parts, MassDamper(), short, 5) for kind in ("reuse", "oracle", "bayes")}
     for outcome in outcomes.values():
-        assert outcome.tasks.target.shape == outcome.episodes.reward.shape == (30, 5)
+        assert outcome.tasks.family.shape == outcome.episodes.reward.shape == (30, 5)
         np.testing.assert_array_equal(outcome.tasks.target, outcomes["reuse"].tasks.target)
         assert (np.diff(outcome.tasks.target, axis=0) == 0).all()
-        missed = np.abs(outcome.episodes.state.x - outcome.tasks.target)
+        missed = np.abs(outcome.episodes.state.x - outcome.tasks.target[..., 0])
         np.testing.assert_allclose(outcome.episodes.reward, -missed, rtol=1e-5)
         assert outcome.total_return == pytest.approx(-missed.sum(axis=0).mean(), rel=1e-5)
     np.testing.assert_array_equal(outcomes["oracle"].episodes.subgoal.value, outcomes["oracle"].tasks.target)
     found = outcomes["bayes"].episodes.belief.mean[-1, :, 1]
-    np.testing.assert_allclose(found, outcomes["bayes"].tasks.target[-1], atol=0.02)
+    np.testing.assert_allclose(found, outcomes["bayes"].tasks.target[-1, :, 0], atol=0.02)
     assert_same(act("reuse", parts, MassDamper(), short, 5), outcomes["reuse"])
 
 
 def test_other_seeds_are_other_tasks(parts, short):
     one, other = (act("reuse", parts, MassDamper(), short, 5, seed=seed).tasks.target for seed in (1, 2))
-    assert not set(one[0]) & set(other[0])
+    assert not set(one[0, :, 0]) & set(other[0, :, 0])
 
 
 def test_disturbances_come_on_the_same_tasks(parts, short):
@@ -317,26 +326,25 @@ def test_disturbances_come_on_the_same_tasks(parts, short):
 def test_held_out_tasks_can_change(parts, short):
     switching = act("reuse", parts, MassDamper(), short, 20, switch_share=1.0)
     assert ((np.diff(switching.tasks.target, axis=0) != 0).sum(axis=0) == 1).all()
-    missed = np.abs(switching.episodes.state.x - switching.tasks.target)
+    missed = np.abs(switching.episodes.state.x - switching.tasks.target[..., 0])
     np.testing.assert_allclose(switching.episodes.reward, -missed, rtol=1e-5)
 
 
 def test_agents_of_the_full_toy_move_it_in_every_way(short):
-    tasks = TaskDistribution((BaseTask("stand", 0.5, 1.5), BaseTask("goal", 2.0, 9.0)))
+    families = FamilySet((line.GOAL.within(interval(2.0, 9.0)), line.STAND.within(interval(0.5, 1.5))))
     inference = replace(short.inference, fields=("x", "pitch"), scales=(10.0, 1.5), latent=3, kinds=1, window=None)
-    full = replace(short, tasks=tasks, inference=inference, toy="full")
+    full = replace(short, families=families, inference=inference, toy="full")
     fresh = trained_parts(initial_state(full, FullToy(), jax.random.key(0)), full)
     for kind in ("reuse", "oracle"):
         state = act(kind, fresh, FullToy(), full, 4).episodes.state
         assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(state))
         assert np.abs(state.pitch).max(axis=0).min() > 0
-    assert set(contract_of(full).target_ranges) == {"goal", "stand"}
+    assert contract_of(full).families == families
 
 
 def test_the_contract_says_what_was_trained(config):
     contract = contract_of(replace(config, inference=replace(config.inference, window=None)))
     assert contract.fields == config.inference.fields
     assert contract.window is None
-    assert contract.target_ranges == {"goal": (-10.0, 10.0)}
-    assert contract.reward == config.reward
+    assert contract.families == config.families
     assert describe_toy(FullToy())["kind"] == "full"

@@ -6,11 +6,12 @@ import jax
 import numpy as np
 import pytest
 
+from rebody.agents.parts import module_places
 from rebody.bodies.toys import make_toy, no_disturbance
 from rebody.control.high_level import PolicyView
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
-from rebody.tasks import FAMILIES, BaseTask, TaskDistribution
+from rebody.tasks import SHIPPED
 from rebody.training.inference import PRESETS
 from rebody.training.inference.config import MixtureConfig
 
@@ -29,21 +30,22 @@ def preset(request):
 
 def test_encoder_and_policy_see_what_moves(preset):
     inference = preset.inference
-    places = {field for field, _ in inference.places}
+    families = preset.families
+    places = {name for place in preset.policy_view.places for name in place.quantity.components}
     view = preset.policy_view
     for fields, scales in ((inference.fields, inference.scales), (view.fields, view.scales)):
         assert set(fields) <= MOVES[preset.toy]
         assert len(fields) == len(scales)
-        assert {SHOWN_BY[family] for family in preset.target_ranges} <= {*fields, *places}
-    assert len(preset.told_view.places) == (len(preset.target_ranges) if places else 0)
+        assert {SHOWN_BY[family] for family in families.names} <= {*fields, *places}
+    assert len(preset.told_view.places) == (len(families) if places else 0)
 
 
 def test_tasks_can_be_done_by_the_toy(preset):
     toy = make_toy(preset.toy)
-    assert set(preset.target_ranges) <= {family.name for family in FAMILIES}
-    for family, (low, high) in preset.target_ranges.items():
-        assert low < high
-        far = max(abs(low), abs(high))
+    assert set(preset.families.names) <= set(SHIPPED.names)
+    for family, box in preset.families.ranges.items():
+        assert box.low < box.high
+        (far,) = box.largest
         if family == "velocity":
             assert far <= toy.max_force / toy.damping
         if family == "stand":
@@ -67,12 +69,12 @@ def test_noise_takes_the_place_of_all_disturbances(name, variance):
     drawn, nominal = noisy.randomisation.sample(jax.random.key(0), (50,)), no_disturbance((50,))
     for part in ("ripple_amplitude", "pitch_ripple", "lag", "gain", "state_noise"):
         np.testing.assert_array_equal(getattr(drawn, part), getattr(nominal, part))
-    assert noisy.tasks == PRESETS["goal-velocity"]().tasks
+    assert noisy.families == PRESETS["goal-velocity"]().families
 
 
 def test_a_policy_without_places_sees_what_the_encoder_sees():
     whole = PRESETS["goal-velocity"]()
-    assert whole.policy_view == PolicyView(("vx",), (3.0,), whole.inference.places)
+    assert whole.policy_view == PolicyView(("vx",), (3.0,), module_places(whole.inference, whole.families))
     unsplit = replace(whole, inference=replace(whole.inference, kinds=0))
     assert unsplit.policy_view == PolicyView(("x", "vx"), (10.0, 3.0))
     assert PRESETS["position"]().policy_view == PolicyView(("x", "vx"), (10.0, 3.5))
@@ -94,8 +96,6 @@ def test_every_field_has_its_scale(option):
     [
         ({"policy_fields": ("vx", "vx"), "policy_scales": (1.0, 1.0)}, "--policy-scales go with fields of which one"),
         ({"mixture": MixtureConfig(maximum=4096), "inference": LARGE}, "--mixture.maximum 4096 is too much"),
-        ({"tasks": TaskDistribution((BaseTask("goal", 2.0, -2.0),))}, r"goal cannot have targets from 2\.0 to -2\.0"),
-        ({"tasks": TaskDistribution((BaseTask("goal", 0.0, 0.0),))}, "goal cannot have targets"),
     ],
 )
 def test_what_no_artifact_may_say_is_not_trained(change, said):

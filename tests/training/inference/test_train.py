@@ -9,11 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.agents.parts import task_code
+from rebody.control.places import TaskCode, places_of
 from rebody.inference.mixture.padded import no_clusters
 from rebody.inference.prior import unit_gaussian
 from rebody.store import tree_hash
-from rebody.tasks import GOAL, VELOCITY
+from rebody.tasks.family_set import FamilySet
+from rebody.tasks.line import VELOCITY as SPEEDS
 from rebody.training.inference import train
 from rebody.training.inference.episodes import Episodes
 from rebody.training.inference.train import (
@@ -26,6 +27,7 @@ from rebody.training.inference.train import (
 from rebody.training.replay import store_group
 from rebody.types import Belief, GlobalState, Task
 
+GOAL, VELOCITY = range(2)
 FIELDS = tuple(GlobalState.__dataclass_fields__)
 VX = FIELDS.index("vx") / 16
 
@@ -45,7 +47,7 @@ def labelled(config):
     return jax.tree.map(
         jnp.asarray,
         Episodes(
-            task=Task(np.full(where[..., 1:].shape, GOAL, np.int32), where[..., :-1] / 1000),
+            task=Task(np.full(where[..., 1:].shape, GOAL, np.int32), where[..., :-1, None] / 1000),
             state=state,
             belief=Belief(latent + 0.5, (latent + 1.0) ** 2),
             action=where[..., :-1, None],
@@ -119,8 +121,8 @@ def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, con
 
 def test_the_oracle_is_told_the_task_that_is_on_at_every_decision(labelled, config):
     """In this replay, another one at every decision; the last one lasts."""
-    told = with_tasks(labelled, task_code(config.target_ranges))
-    target = np.asarray(labelled.task.target) / 10.0
+    told = with_tasks(labelled, TaskCode(places_of(config.families)))
+    target = np.asarray(labelled.task.target)[..., 0] / 10.0
     assert told.belief.mean.shape == (*labelled.state.x.shape, 2)
     np.testing.assert_array_equal(told.belief.mean[..., 0], np.ones(labelled.state.x.shape))
     np.testing.assert_allclose(told.belief.mean[..., :-1, 1], target, rtol=1e-6)
@@ -143,20 +145,16 @@ def test_the_oracle_is_told_the_task_that_is_on_at_every_decision(labelled, conf
 @pytest.fixture(scope="module")
 def switched(labelled):
     """The replay, its episodes a speed forward until decision 5, then a goal behind."""
-    is_first = jnp.arange(labelled.task.target.shape[-1]) < 5
-    return eqx.tree_at(
-        lambda e: e.task,
-        labelled,
-        jax.tree.map(
-            lambda leaf: jnp.broadcast_to(leaf, labelled.task.target.shape),
-            Task(jnp.where(is_first, VELOCITY, GOAL), jnp.where(is_first, 2.0, -3.0)),
-        ),
-    )
+    shape = labelled.task.family.shape
+    is_first = jnp.broadcast_to(jnp.arange(shape[-1]) < 5, shape)
+    changing = Task(jnp.where(is_first, VELOCITY, GOAL), jnp.where(is_first, 2.0, -3.0)[..., None])
+    return eqx.tree_at(lambda e: e.task, labelled, changing)
 
 
 @pytest.mark.parametrize("window", [4, None])
 def test_a_belief_must_explain_its_own_task_alone(switched, config, window):
-    carried = replace(config, inference=replace(config.inference, window=window))
+    families = config.families.beside(FamilySet((SPEEDS,)))
+    carried = replace(config, families=families, inference=replace(config.inference, window=window))
     evidence = sample_evidence(switched, 3, carried, jax.random.key(0))
     believed, explained = unpack(evidence.window.previous.x)[2], unpack(evidence.previous.x)[2]
     assert evidence.same_task.shape == (300, window or config.decisions, config.inference.decoded)

@@ -9,11 +9,12 @@ import pytest
 
 from rebody.bodies import RobotBatch
 from rebody.control.flat import FlatView
-from rebody.control.high_level import told_code
+from rebody.control.places import Place, TaskCode
 from rebody.control.sac import SACConfig
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
-from rebody.tasks import GOAL, reward
+from rebody.ranges import interval
+from rebody.tasks import line
 from rebody.training.inference.train import with_tasks
 from rebody.training.scratch import ScratchConfig
 from rebody.training.scratch.train import collect, initial_state, interpret, sample_steps
@@ -22,7 +23,8 @@ from rebody.types import Task, Transition, global_state
 
 ROBOTS, DECISIONS, GROUPS, START = 3, 5, 2, 15.0
 PER_DECISION, JOINTS = 2, 17
-PLACES = (("x", 10.0), ("vx", 3.0))
+GOAL = 0
+PLACES = (Place(line.GOAL.quantity, (10.0,)), Place(line.VELOCITY.quantity, (3.0,)))
 VIEW = FlatView(PLACES)
 
 
@@ -50,8 +52,7 @@ def group(config, state, cheetah):
 
 
 def test_tasks_are_within_reach_and_starts_anywhere(group, meta):
-    ranges = {task.family: (task.low, task.high) for task in meta.tasks.base_tasks}
-    assert ranges == {"goal": (-15.0, 15.0), "velocity": (-3.0, 3.0)}
+    assert meta.families.ranges == {"goal": interval(-15.0, 15.0), "velocity": interval(-3.0, 3.0)}
     begun = group.episodes.state.x[:, 0]
     assert (np.abs(begun) <= START).all()
     assert np.ptp(begun) > 1.0
@@ -59,14 +60,14 @@ def test_tasks_are_within_reach_and_starts_anywhere(group, meta):
 
 def test_where_a_step_leaves_a_robot_its_next_one_begins(group):
     steps = group.steps
-    np.testing.assert_array_equal(steps.next_x[:-1], steps.x[1:])
+    np.testing.assert_array_equal(steps.next_pose[:-1], steps.pose[1:])
     np.testing.assert_array_equal(steps.next_joints[:-1], steps.joints[1:])
-    assert steps.x.shape == (DECISIONS * PER_DECISION, ROBOTS)
+    assert steps.pose.shape == (DECISIONS * PER_DECISION, ROBOTS, 6)
 
 
 def test_decisions_and_control_steps_tell_of_the_same_motion(group):
     episodes, steps = group.episodes, group.steps
-    np.testing.assert_array_equal(episodes.state.x[:, :-1].T, steps.x[::PER_DECISION])
+    np.testing.assert_array_equal(episodes.state.x[:, :-1].T, steps.pose[::PER_DECISION, :, 0])
     np.testing.assert_allclose(episodes.state.vx[:, 1:], np.diff(episodes.state.x) / 0.1, atol=1e-4)
     of_decision = steps.action.reshape(DECISIONS, PER_DECISION, ROBOTS, -1).mean(axis=1)
     np.testing.assert_allclose(episodes.action, of_decision.swapaxes(0, 1), atol=1e-6)
@@ -77,7 +78,7 @@ def test_the_module_hears_the_tasks_own_reward_and_the_beliefs_are_its_own(group
     after = jax.tree.map(lambda leaf: leaf[:, 1:], episodes.state)
     before = jax.tree.map(lambda leaf: leaf[:, :-1], episodes.state)
     task = jax.tree.map(jnp.asarray, episodes.task)
-    np.testing.assert_allclose(episodes.reward, reward(task, after, meta.reward), rtol=1e-5)
+    np.testing.assert_allclose(episodes.reward, meta.families.reward(task, after), rtol=1e-5)
     first = jax.tree.map(lambda leaf: leaf[:, :4], Transition(before, episodes.reward, after))  # a window
     beliefs = state.module.encoder.along(first)
     np.testing.assert_allclose(episodes.belief.mean[:, 1:5], beliefs.mean, atol=1e-4)
@@ -91,8 +92,8 @@ def test_going_to_a_goal_is_paid_by_how_well_its_speed_is_held(config, state, ch
     group = collect(state, batch, still, np.random.default_rng(0), jax.random.key(3))
     steps, is_goal = group.steps, group.episodes.task.family[:, 0] == GOAL
     assert is_goal.any()
-    left = (group.episodes.task.target[:, 0] - steps.next_x)[:, is_goal]
-    wanted, speed = np.clip(1.5 * left, -3.0, 3.0), (steps.next_x - steps.x)[:, is_goal] / 0.05
+    left = (group.episodes.task.target[:, 0, 0] - steps.next_pose[..., 0])[:, is_goal]
+    wanted, speed = np.clip(1.5 * left, -3.0, 3.0), (steps.next_pose - steps.pose)[:, is_goal, 0] / 0.05
     held = np.maximum(1 - np.abs(wanted - speed) / np.maximum(np.abs(wanted), 0.5), -0.5)
     posture = 0.5 * (1 - np.cos(steps.next_joints[..., 1])) + 0.02 * np.mean(steps.action**2, axis=-1)
     expected = 0.5 * held + 0.02 / (0.1 + np.abs(left)) - posture[:, is_goal]
@@ -101,14 +102,14 @@ def test_going_to_a_goal_is_paid_by_how_well_its_speed_is_held(config, state, ch
 
 def seen_at(steps, step, robot, known):
     """What the policy sees before and after a control step of the first group, by what is known at its decisions."""
-    ends = (steps.joints, steps.x, step), (steps.next_joints, steps.next_x, step + 1)
+    ends = (steps.joints, steps.pose, step), (steps.next_joints, steps.next_pose, step + 1)
     return [
         VIEW(
             joints[step, robot],
-            jnp.asarray(x[step, robot]),
+            jnp.asarray(pose[step, robot]),
             jax.tree.map(lambda leaf: leaf[0, robot, at // PER_DECISION], known),  # noqa: B023 (used at once)
         )
-        for joints, x, at in ends
+        for joints, pose, at in ends
     ]
 
 
@@ -116,7 +117,7 @@ def test_a_control_step_is_learned_from_with_the_belief_of_its_decision_or_the_t
     """Whose sample is which shows by x, which no two control steps share."""
     replay = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), group)
     believed = state.module.decoder.interpret(replay.episodes.belief)
-    told = with_tasks(replay.episodes, told_code(PLACES)).belief
+    told = with_tasks(replay.episodes, TaskCode(PLACES)).belief
     batch = sample_steps(replay, believed, told, 2, config, jax.random.key(1))
     steps, times_told = group.steps, 0
     for row in range(100):
@@ -132,7 +133,7 @@ def test_a_control_step_is_learned_from_with_the_belief_of_its_decision_or_the_t
 def test_who_is_told_goes_by_the_truth_in_the_terms_of_a_belief(config, state):
     """A goal at -5 m: meant is x, half of its scale to the back, no doubt."""
     four = replace(config, robots=4)
-    task = Task(np.full(4, GOAL, np.int32), np.full(4, -5.0, np.float32))
+    task = Task(np.full(4, GOAL, np.int32), np.full((4, 1), -5.0, np.float32))
     known = begin_inference(state.module.encoder, global_state(x=np.zeros(4, np.float32)), task)
     gone_by = interpret(state.module, known, four)
     np.testing.assert_allclose(gone_by.mean[:2], [[1.0, 0.0, -0.5, 0.0]] * 2)
@@ -148,9 +149,8 @@ def test_a_latent_that_says_no_places_is_refused(config):
 
 
 def test_the_policy_sees_goals_from_where_it_is_and_speeds_as_they_are(state):
-    belief = Task(np.zeros(1, np.int32), np.zeros(1, np.float32))  # only its shape matters here
-    understood = state.module.decoder.interpret(state.module.encoder.prior(belief.target.shape))
+    understood = state.module.decoder.interpret(state.module.encoder.prior((1,)))
     joints = np.zeros((1, JOINTS), np.float32)
-    here, there = (VIEW(joints, np.full(1, x, np.float32), understood) for x in (0.0, 1.0))
+    here, there = (VIEW(joints, np.array([[x, 0, 0, 0, 0, 0]], np.float32), understood) for x in (0.0, 1.0))
     moved = np.flatnonzero(np.asarray(here != there)[0])
     np.testing.assert_array_equal(moved, [JOINTS + 2])  # how far ahead the goal is

@@ -9,17 +9,20 @@ import pytest
 from rebody.agents.parts import LoadedTracker
 from rebody.bodies import RobotBatch
 from rebody.control import sac
+from rebody.control.command import commands_within, relative
 from rebody.control.sac import SACBatch, SACConfig
 from rebody.control.step_predictor import steps_of
-from rebody.control.tracker import relative, tracker_observation
+from rebody.control.tracker import Tracker, command_inputs, tracker_observation
+from rebody.errors import RebodyError
 from rebody.store import tree_hash
-from rebody.tasks import GOAL, VELOCITY
+from rebody.tasks import SHIPPED
 from rebody.training.off_policy import initial_state, learn
 from rebody.training.replay import Replay
 from rebody.training.step_predictor import StepPredictorConfig
 from rebody.training.step_predictor.chase import Fixed, advance, begin
-from rebody.training.step_predictor.train import StepPredictorLearner
+from rebody.training.step_predictor.train import StepPredictorLearner, train_step_predictor
 
+GOAL, VELOCITY = range(2)  # slots
 ROBOTS, JOINTS = 5, 17
 STEPS = (1, 2, 3, 7, 20)
 """How long each robot holds its subgoals."""
@@ -46,33 +49,33 @@ def batch(cheetah):
 
 @pytest.fixture
 def walk(batch, tracker, config):
-    """A function (chooser, control steps) -> the world, and the transitions of each step."""
+    """A function (chooser, control steps) -> what is chased, and the transitions of each step."""
 
     def walk(chooser, steps):
         rng = np.random.default_rng(1)
-        world = begin(batch, tracker.reach, chooser, config, jax.random.key(0))
+        chase = begin(batch, tracker.families, chooser, config, jax.random.key(0))
         for step in range(steps):
-            yield world, advance(world, batch, tracker, chooser, config, rng, jax.random.key(step))
+            yield chase, advance(chase, batch, tracker, chooser, config, rng, jax.random.key(step))
 
     return walk
 
 
 def test_every_robot_has_its_own_number_of_steps_left(walk):
     """Transitions are written when a count has run out, the others go on."""
-    for step, (world, seen) in enumerate(walk(Own(), 42), 1):
+    for step, (chase, seen) in enumerate(walk(Own(), 42), 1):
         ended = [steps for steps in STEPS if step % steps == 0]
         np.testing.assert_array_equal(steps_of(seen.action), ended)
         left = [steps - step % steps for steps in STEPS]
-        np.testing.assert_array_equal(world.chase.steps_left, left)
+        np.testing.assert_array_equal(chase.steps_left, left)
 
 
-def test_a_subgoal_is_where_the_toy_is_after_one_decision(walk):
+def test_a_subgoal_is_where_the_toy_is_after_one_decision(walk, batch):
     """From rest it gets 0.07 m or 0.7 m/s far; a robot's own speed counts."""
     slots = set()
-    for world, _ in walk(Fixed(jnp.asarray(2)), 30):
-        chase, decided = world.chase, world.chase.steps_left == 2
-        x, v = world.trail[-1, :, 0], (world.trail[-1] - world.trail[0])[:, 0] / 0.1
-        ahead = chase.subgoal.value - np.where(chase.subgoal.slot == GOAL, x + 0.08 * v, 0.8 * v)
+    for chase, _ in walk(Fixed(jnp.asarray(2)), 30):
+        decided, state = chase.steps_left == 2, batch.observe()
+        x, v = state.x, state.vx
+        ahead = chase.subgoal.value[:, 0] - np.where(chase.subgoal.slot == GOAL, x + 0.08 * v, 0.8 * v)
         reach = np.where(chase.subgoal.slot == GOAL, 0.07, 0.7)
         assert (np.abs(ahead[decided]) <= reach[decided] + 1e-5).all()
         slots |= set(chase.subgoal.slot.tolist())
@@ -82,21 +85,21 @@ def test_a_subgoal_is_where_the_toy_is_after_one_decision(walk):
 def test_a_transition_is_the_subgoal_its_choice_and_its_end(walk, batch, tracker):
     """Reward by hand; where one subgoal ends, the next begins."""
     steps, held, before = 3, None, None
-    for step, (world, seen) in enumerate(walk(Fixed(jnp.asarray(steps)), 12), 1):
+    for step, (chase, seen) in enumerate(walk(Fixed(jnp.asarray(steps)), 12), 1):
         if step % steps:
-            before = held or jax.tree.map(np.copy, world.chase)
+            before = held or jax.tree.map(np.copy, chase)
             assert not len(seen.reward)
             continue
         assert before is not None
-        now = {GOAL: batch.x, VELOCITY: (batch.x - world.trail[0][:, 0]) / 0.1}
-        error = np.abs(np.where(before.subgoal.slot == GOAL, now[GOAL], now[VELOCITY]) - before.subgoal.value)
-        paid = -error / np.maximum(np.abs(before.command.value), 0.05) - 0.1 * steps
+        now = batch.observe()
+        error = np.abs(np.where(before.subgoal.slot == GOAL, now.x, now.vx) - before.subgoal.value[:, 0])
+        paid = -error / np.maximum(np.abs(before.command.value[:, 0]), 0.05) - 0.1 * steps
         np.testing.assert_allclose(seen.reward, np.maximum(paid, -2), atol=1e-3)
         np.testing.assert_array_equal(seen.observation, before.observation)
-        held = jax.tree.map(np.copy, world.chase)
+        held = jax.tree.map(np.copy, chase)
         np.testing.assert_array_equal(seen.next_observation, held.observation)
-        sees = relative(held.subgoal, batch.x.astype(np.float32), batch.spec.pitch(batch.qpos).astype(np.float32))
-        expected = tracker_observation(batch.proprioception(), sees, tracker.reach)
+        sees = relative(tracker.families, held.subgoal, batch.pose().astype(np.float32))
+        expected = tracker_observation(batch.proprioception(), sees, tracker.families)
         np.testing.assert_allclose(held.observation, expected, atol=1e-4)
         assert not seen.terminal.any()
 
@@ -107,21 +110,40 @@ def test_a_fall_ends_it_all_and_is_the_worst(walk, batch):
     next(steps)
     batch.qpos[1, [0, 2]] = 4.0, np.pi  # on its back, for long enough
     batch.lying_s[1] = 5.0
-    world, seen = next(steps)
+    chase, seen = next(steps)
     np.testing.assert_array_equal(seen.terminal, [1])
     np.testing.assert_allclose(seen.reward, [-2 / (1 - 0.98)], rtol=1e-5)
     assert abs(batch.qpos[1, 0]) < 0.2
     assert abs(batch.qpos[1, 2]) < 0.2
-    np.testing.assert_array_equal(world.chase.steps_left, [18, 20, 18, 18, 18])
-    np.testing.assert_array_equal(world.trail[:, 1], np.tile(batch.qpos[1], (3, 1)))
+    np.testing.assert_array_equal(chase.steps_left, [18, 20, 18, 18, 18])
+    assert batch.observe().vx[1] == 0
 
 
 def test_tasks_change_only_when_a_subgoal_has_ended(walk):
     before = None
-    for world, seen in walk(Fixed(jnp.asarray(4)), 40):
-        task = tree_hash(world.chase.task)
+    for chase, seen in walk(Fixed(jnp.asarray(4)), 40):
+        task = tree_hash(chase.task)
         assert task == before or before is None or len(seen.reward)
         before = task
+
+
+def test_only_places_and_speeds_along_x_are_chased_wherever_a_tracker_has_them(batch, cheetah, config):
+    families = commands_within(cheetah.reach, SHIPPED).only(("stand", "velocity", "goal"))
+    slots = set()
+    for seed in range(10):
+        chase = begin(batch, families, Fixed(jnp.asarray(2)), config, jax.random.key(seed))
+        np.testing.assert_array_equal(chase.subgoal.slot, chase.task.family)
+        slots |= {families[slot].name for slot in chase.subgoal.slot}
+    assert slots == {"velocity", "goal"}
+
+
+def test_a_tracker_that_knows_neither_is_refused(cheetah, config, tmp_path, monkeypatch):
+    families = commands_within(cheetah.reach, SHIPPED).only(("stand",))
+    actor = sac.Actor(JOINTS + command_inputs(families), cheetah.model.nu, config.sac, jax.random.key(0))
+    still = LoadedTracker("still", "cheetah", Tracker(actor, families))
+    monkeypatch.setattr("rebody.training.step_predictor.train.load_tracker", lambda name: still)
+    with pytest.raises(RebodyError, match="'still' is told neither places nor speeds along x"):
+        train_step_predictor("cheetah", "still", config, tmp_path, 0)
 
 
 def test_the_buffer_holds_every_subgoal_and_nothing_frozen_changes(batch, tracker, config):

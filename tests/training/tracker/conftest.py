@@ -4,18 +4,20 @@ import numpy as np
 import pytest
 
 from rebody.bodies import RobotBatch
-from rebody.bodies.robot import Reach
+from rebody.control.command import commands_within
 from rebody.control.sac import SACConfig
+from rebody.ranges import interval
+from rebody.tasks import SHIPPED
 from rebody.training.tracker import TrackerConfig
 
-REACH = Reach(speed=(-3.0, 3.0))
+COMMANDS = commands_within((("goal", interval(-5.0, 5.0)), ("velocity", interval(-3.0, 3.0))), SHIPPED)
 ROBOTS, STEPS, ROWS = 3, 4, 29  # a buffer that is no multiple of the twelve rows of a turn
 
 
 @pytest.fixture
 def config():
     return TrackerConfig(
-        reach=REACH,
+        families=COMMANDS,
         robots=ROBOTS,
         steps=STEPS,
         updates=5,

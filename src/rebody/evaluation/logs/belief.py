@@ -14,7 +14,7 @@ from rebody.agents.parts import Inference
 from rebody.evaluation.logs.file import COLUMNS, REWARD, TIME
 from rebody.evaluation.logs.resample import Decisions
 from rebody.store.files import written_whole
-from rebody.tasks import family_named
+from rebody.tasks import Family, FamilySet
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,8 @@ class BeliefOverTime:
     """A run and what was believed after each of its decisions."""
 
     inference: str
+    families: FamilySet
+    """Those that the module knows."""
     decisions: Decisions
     readings: list[Reading]
     believed: int
@@ -36,15 +38,10 @@ class BeliefOverTime:
         """When each decision ended."""
         return self.decisions.time_s[1:]
 
-    @property
-    def families(self) -> tuple[str, ...]:
-        """Those that the module knows."""
-        return tuple(self.readings[-1].probabilities)
-
-    @property
-    def targets(self) -> Float[np.ndarray, " decision"]:
-        """What was read, in the unit of the family that was believed [m, m/s, rad]."""
-        return np.array([reading.target for reading in self.readings])
+    def targets(self, family: Family) -> Float[np.ndarray, "decision size"]:
+        """What was read while the family was believed [m, m/s, rad], else NaN."""
+        nothing = (np.nan,) * family.size
+        return np.array([reading.target if reading.family == family.name else nothing for reading in self.readings])
 
     @property
     def latent(self) -> Float[np.ndarray, "decision latent"]:
@@ -56,20 +53,21 @@ class BeliefOverTime:
         """Responsibilities of the mixture's clusters; none where there is no mixture."""
         return np.array([list(reading.responsibilities.values()) for reading in self.readings])
 
-    def believes(self, family: str) -> np.ndarray:
+    def believes(self, family: Family) -> np.ndarray:
         """Whether the family was the likeliest, at each decision."""
-        return np.array([reading.family == family for reading in self.readings])
+        return np.array([reading.family == family.name for reading in self.readings])
 
     def conclusion(self) -> str:
         """What is believed at the end, and since when."""
         if not self.believed:
             return "believes nothing: there was no reward that it could believe"
         last = self.readings[-1]
-        family = family_named(last.family)
-        is_same = self.believes(last.family)
-        is_close = is_same & (np.abs(self.targets - last.target) <= family.tolerance)
+        family = self.families.named(last.family)
+        apart = family.quantity.distance(self.targets(family), np.array(last.target))
+        is_same, is_close = self.believes(family), np.nan_to_num(apart, nan=np.inf) <= family.tolerance
+        target = ", ".join(f"{number:.2f}" for number in last.target)
         return (
-            f"believes at {self.time_s[-1]:.1f} s: {last.family} {last.target:.2f} {family.unit}, "
+            f"believes at {self.time_s[-1]:.1f} s: {last.family} {target} {family.unit}, "
             f"{last.family} with probability {last.probabilities[last.family]:.2f}; {last.family} since "
             f"{self._since(is_same):.1f} s, within {family.tolerance:g} {family.unit} of that since "
             f"{self._since(is_close):.1f} s"
@@ -88,7 +86,8 @@ def believe(inference: Inference, decisions: Decisions) -> BeliefOverTime:
     rewards = [None if math.isnan(reward) else float(reward) for reward in decisions.reward]
     readings = [belief.update(*heard) for heard in zip(states[1:], rewards, strict=True)]
     doubts, notes = belief.doubts(math.inf), belief.notes(math.inf)
-    return BeliefOverTime(inference.name, decisions, readings, belief.believed, doubts, notes)
+    families = inference.contract.families
+    return BeliefOverTime(inference.name, families, decisions, readings, belief.believed, doubts, notes)
 
 
 def save_beliefs(run: BeliefOverTime, path: Path) -> None:
@@ -99,7 +98,7 @@ def save_beliefs(run: BeliefOverTime, path: Path) -> None:
     heard = {name: np.where(unheard, np.nan, values) for name, values in (states | {REWARD: decisions.reward}).items()}
     with written_whole(path) as unfinished, unfinished.open("w", newline="") as file:
         rows = [
-            {TIME: run.time_s[i]} | {name: values[i] for name, values in heard.items()} | _row(reading)
+            {TIME: run.time_s[i]} | {name: values[i] for name, values in heard.items()} | _row(reading, run.families)
             for i, reading in enumerate(run.readings)
         ]
         writer = csv.DictWriter(file, rows[0])
@@ -107,10 +106,12 @@ def save_beliefs(run: BeliefOverTime, path: Path) -> None:
         writer.writerows({name: _plain(value) for name, value in row.items()} for row in rows)
 
 
-def _row(reading: Reading) -> dict[str, Any]:
+def _row(reading: Reading, families: FamilySet) -> dict[str, Any]:
+    names = ["inferred_target", *(f"inferred_target_{i}" for i in range(2, families.size + 1))]
+    target = [*reading.target, *[math.nan] * (families.size - len(reading.target))]
     return {
         "inferred_family": reading.family,
-        "inferred_target": reading.target,
+        **dict(zip(names, target, strict=True)),
         **{f"probability_{family}": p for family, p in reading.probabilities.items()},
         **{f"cluster_{k}": share for k, share in reading.responsibilities.items()},
         **{f"latent_{i + 1}": value for i, value in enumerate(reading.latent.mean)},

@@ -7,7 +7,6 @@ from rebody.evaluation.logs.file import COLUMNS, Log
 from rebody.evaluation.logs.origin import farthest_asked
 from rebody.evaluation.logs.resample import Decisions, mean_logged
 from rebody.inference.contract import Contract
-from rebody.tasks import FAMILIES
 from rebody.types import RATE_OF
 
 DISAGREEMENT = 0.5
@@ -59,9 +58,11 @@ def _limits(contract: Contract) -> dict[str, float]:
 
 
 def _ranges(contract: Contract) -> str:
-    units = {family.name: family.unit for family in FAMILIES}
-    ranges = contract.target_ranges.items()
-    return ", ".join(f"{name} from {low:.3g} to {high:.3g} {units[name]}" for name, (low, high) in ranges)
+    said = []
+    for family in contract.families:
+        ends = zip(family.range.low, family.range.high, strict=True)
+        said.append(f"{family.name} from " + " and ".join(f"{low:.3g} to {high:.3g}" for low, high in ends))
+    return ", ".join(f"{each} {family.unit}" for each, family in zip(said, contract.families, strict=True))
 
 
 def _rms(values: Float[np.ndarray, " n"]) -> float:

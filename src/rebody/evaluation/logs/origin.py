@@ -4,7 +4,6 @@ from dataclasses import replace
 
 from rebody.evaluation.logs.file import COLUMNS, Log
 from rebody.inference.contract import Contract
-from rebody.tasks import FAMILIES
 
 HORIZONTAL = ("x", "y")
 """Fields that may begin anywhere; a height or a pitch is told from the rest pose."""
@@ -28,9 +27,9 @@ def begun_at_zero(log: Log, contract: Contract) -> Log:
 
 
 def farthest_asked(contract: Contract) -> dict[str, float]:
-    """The largest target of the training, either way, of each quantity that tasks were about [m, m/s, rad]."""
-    return {
-        family.quantity.name: max(abs(end) for end in contract.target_ranges[family.name])
-        for family in FAMILIES
-        if family.name in contract.target_ranges
-    }
+    """The largest target of the training, either way, of each field that tasks were about [m, m/s, rad]."""
+    asked: dict[str, float] = {}
+    for family in contract.families:
+        for field, largest in zip(family.quantity.components, family.range.largest, strict=True):
+            asked[field] = max(largest, asked.get(field, 0.0))
+    return asked

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from rebody.evaluation.results import Results
 from rebody.report.figures import draw_beliefs, draw_errors, draw_readings, draw_trajectories
 from rebody.report.page.drawing import CURVES, panel
-from rebody.tasks import FAMILIES, Family
+from rebody.tasks import Family
 
 KIND = "kind of task"
 """The figure of latents."""
@@ -30,8 +30,8 @@ def settings_of(results: Results) -> dict[str, Any]:
 def figures_of(results: Results) -> dict[str, Markup]:
     """What the robot did, family by family, and what was believed in the end, if its latents fit together."""
     motion = {
-        f"what the robot did: {name}": panel(partial(draw_trajectories, episodes=results.of(name)))
-        for name in results.families
+        f"what the robot did: {family.name}": panel(partial(draw_trajectories, episodes=results.of(family.name)))
+        for family in results.families
     }
     lengths = {len(latent) for episode in results.episodes for latent in episode.latent}
     kind = {KIND: panel(partial(draw_beliefs, results=results))} if len(lengths) == 1 and lengths != {0} else {}
@@ -45,8 +45,8 @@ def legend(compared: Iterable[str]) -> dict[str, tuple[str, str]]:
 
 def errors_of(compared: Mapping[str, Results]) -> dict[str, Markup]:
     """Of each family, which share of episodes has at most which error, a line per evaluation."""
-    families = [family for family in FAMILIES if any(results.of(family.name) for results in compared.values())]
-    return {f"final errors: {family.name}": panel(partial(_errors, family, compared)) for family in families}
+    families = {family.name: family for results in compared.values() for family in results.families}
+    return {f"final errors: {name}": panel(partial(_errors, family, compared)) for name, family in families.items()}
 
 
 def _errors(family: Family, compared: Mapping[str, Results], axes: Axes) -> None:

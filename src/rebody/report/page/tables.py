@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from rich.table import Table
 from rich.text import Text
 
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.results import Results
-from rebody.tasks import family_named
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ def _row(episode: EpisodeResult) -> list[str]:
     return [
         _task(episode),
         str(episode.seed),
-        f"{episode.inferred_family[-1]} {episode.inferred_target[-1]:+.3f}",
-        f"{episode.final_error:.3f} {family_named(episode.active_family[-1]).unit}",
+        f"{episode.inferred_family[-1]} {vector(episode.inferred_target[-1], '+.3f')}",
+        f"{episode.final_error:.3f} {episode.last_family.unit}",
         f"{episode.ripple_m_s:.3f}",
         f"{episode.return_:.2f}",
         "-" if episode.oracle_return is None else f"{episode.oracle_return:.2f}",
@@ -52,13 +52,19 @@ def _row(episode: EpisodeResult) -> list[str]:
 
 
 def _task(episode: EpisodeResult) -> str:
-    text = f"{episode.family} {episode.target:+.3g}"
+    text = f"{episode.family} {vector(episode.target)}"
     if episode.switch is None:
         return text
     at_s, family, target = (episode.switch.get(name) for name in ("at_s", "family", "target"))
-    if not (isinstance(at_s, float | int) and isinstance(target, float | int)):
-        return f"{text}, then {episode.active_family[-1]} {episode.active_target[-1]:+.3g}"
-    return f"{text}, from {at_s:g} s {family} {target:+.3g}"
+    numbers = target if isinstance(target, list | tuple) else [target]  # a number in files of earlier releases
+    if not all(isinstance(number, float | int) for number in (at_s, *numbers)):
+        return f"{text}, then {episode.active_family[-1]} {vector(episode.active_target[-1])}"
+    return f"{text}, from {at_s:g} s {family} {vector(numbers)}"
+
+
+def vector(numbers: Sequence[Any], form: str = "+.3g") -> str:
+    """Its numbers in words."""
+    return ", ".join(format(number, form) for number in numbers)
 
 
 def _plain(cell: object) -> str:

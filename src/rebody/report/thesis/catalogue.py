@@ -13,7 +13,7 @@ from rebody.report.thesis.data import Data
 from rebody.report.thesis.learning import HIGH_LEVELS, title_of
 from rebody.report.thesis.panels import Panel
 from rebody.report.thesis.trainings import logs_of, train_again, training_log
-from rebody.tasks import GOAL, STAND, VELOCITY
+from rebody.tasks.line import GOAL, STAND, VELOCITY
 
 WIDTHS = {1: 7.5, 2: 10.5, 3: 13.0, 4: 15.0}
 """Of figures with so many columns [inches]."""

@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import safetensors.numpy
 
-from rebody.evaluation.evaluate import Trial, check_trial, run_trial, start_seeds, trial_agent
+from rebody.evaluation.evaluate import run_trial, start_seeds, trial_agent
+from rebody.evaluation.trial import Trial, check_trial
 from rebody.store.files import written_whole
+from rebody.tasks.line import GOAL, LINE
 from rebody.tasks.task_file import TaskSpec, active_tasks
 from rebody.types import DECISION_DT
 
@@ -30,17 +32,17 @@ def save(data: Data, path: Path) -> None:
 
 def on_goals(trial: Trial, targets: np.ndarray) -> Data:
     """`trajectories` on hidden goals."""
-    return trajectories(trial, [TaskSpec("goal", float(target)) for target in targets])
+    return trajectories(trial, [TaskSpec(GOAL.name, (float(target),)) for target in targets])
 
 
 def trajectories(trial: Trial, specs: list[TaskSpec]) -> Data:
-    """Episodes on hidden tasks.
+    """Episodes on hidden tasks of the line.
 
     time_s [time]; position_m, velocity_m_s and pitch_rad [time, episode]; latent [time, episode, latent]; family
-    (its index) and target [episode]. `decision_s` is the time from one decision to the next.
+    (its index on the line) and target [episode]. `decision_s` is the time from one decision to the next.
     """
     check_trial(trial, specs)
-    tasks = active_tasks(specs, trial.decisions, DECISION_DT)
+    tasks = active_tasks(specs, trial.in_play, trial.decisions, DECISION_DT)
     episodes = run_trial(trial, trial_agent(trial, tasks), tasks, start_seeds(specs, np.zeros(len(specs), int)))
     every = -(-trial.decisions // POINTS)
     kept = np.arange(every - 1, trial.decisions, every)
@@ -51,8 +53,8 @@ def trajectories(trial: Trial, specs: list[TaskSpec]) -> Data:
         "velocity_m_s": np.asarray(episodes.state.vx)[kept],
         "pitch_rad": np.asarray(episodes.state.pitch)[kept],
         "latent": np.asarray(episodes.belief.mean)[kept],
-        "family": np.asarray(tasks.family[-1]),
-        "target": np.asarray(tasks.target[-1], float),
+        "family": np.array([LINE.index(spec.last.family) for spec in specs]),
+        "target": np.array([spec.last.target[0] for spec in specs]),
         "decision_s": np.array(decision_s),
     }
 

@@ -17,9 +17,10 @@ from rebody.bodies.camera import Camera
 from rebody.bodies.robot import Reach
 from rebody.bodies.toy_models import mass_damper_model
 from rebody.bodies.toys import MassDamper
-from rebody.evaluation.evaluate import Trial
+from rebody.evaluation.trial import Trial
 from rebody.report.thesis.data import Data, join, on_goals, trajectories
 from rebody.report.thesis.panels import EPISODES
+from rebody.tasks.line import GOAL, LINE
 from rebody.tasks.task_file import TaskSpec
 from rebody.training.inference import PRESETS
 
@@ -54,25 +55,25 @@ def toy_picture() -> Data:
 
 def position_on_toy() -> Data:
     """`position-thesis` on the toy that it learned on."""
-    return on_goals(Trial("reuse", load_inference("position-thesis"), None, None), THESIS_GOALS)
+    return on_goals(Trial("reuse", load_inference("position-thesis"), LINE, None, None), THESIS_GOALS)
 
 
 def flat_on_cheetah() -> Data:
     """The flat policy on the cheetah."""
     flat = load_flat("flat-position-cheetah")
-    return on_goals(Trial("flat", load_inference("position"), load_robot("cheetah"), None, flat=flat), GOALS)
+    return on_goals(Trial("flat", load_inference("position"), LINE, load_robot("cheetah"), None, flat=flat), GOALS)
 
 
 def thesis_on(robot: str, stride: int) -> Data:
     """`position-thesis` on a robot in thesis mode."""
-    parts = load_inference("position-thesis"), load_robot(robot), load_tracker(f"tracker-{robot}")
+    parts = load_inference("position-thesis"), LINE, load_robot(robot), load_tracker(f"tracker-{robot}")
     trial = Trial("reuse", *parts, seconds=SECONDS[stride], stride=stride, horizon=1, thesis=True)
     return on_goals(trial, THESIS_GOALS)
 
 
 def ours_on(robot: str) -> Data:
     """`position` on a robot, a decision every 0.1 s."""
-    parts = load_inference("position"), load_robot(robot), load_tracker(f"tracker-{robot}")
+    parts = load_inference("position"), LINE, load_robot(robot), load_tracker(f"tracker-{robot}")
     return on_goals(Trial("reuse", *parts), THESIS_GOALS)
 
 
@@ -89,25 +90,27 @@ def positions_on(robot: str) -> Data:
 # sections 6.4 and 6.5: several families
 
 
-def tasks_of_each_kind(reach: Reach | None = None, preset: str = "goal-velocity") -> list[TaskSpec]:
-    """Evenly spaced over each base task, as far as a body reaches."""
-    specs = []
-    for task in PRESETS[preset]().tasks.base_tasks:
-        ends = reach.within(task.family, task.low, task.high) if reach else (task.low, task.high)
-        targets = np.linspace(*ends, EPISODES)
-        specs += [TaskSpec(task.family, float(target)) for target in targets]
+def tasks_of_each_kind(reach: Reach = (), preset: str = "goal-velocity") -> list[TaskSpec]:
+    """Evenly spaced over each base task, as far as a body reaches: goals may lie farther off than it is shown them."""
+    limits, specs = {name: box for name, box in reach if name != GOAL.name}, []
+    for family in PRESETS[preset]().families:
+        for box in family.targets:
+            within = limits.get(family.name, box)
+            ends = max(box.low[0], within.low[0]), min(box.high[0], within.high[0])
+            specs += [TaskSpec(family.name, (float(target),)) for target in np.linspace(*ends, EPISODES)]
     return specs
 
 
 def on_toy() -> Data:
     """`goal-velocity` on the toy."""
-    return trajectories(Trial("reuse", load_inference("goal-velocity"), None, None), tasks_of_each_kind())
+    return trajectories(Trial("reuse", load_inference("goal-velocity"), LINE, None, None), tasks_of_each_kind())
 
 
 def on_robot(module: str, robot: str) -> Data:
     """A module with the toy's policy on a robot, on tasks of each kind that the robot is fast enough for."""
     inference, spec = load_inference(module), load_robot(robot)
-    trial = Trial("reuse", inference, spec, load_tracker(f"tracker-{robot}"), slots=load_slots_of(inference, None))
+    slots = load_slots_of(inference, None)
+    trial = Trial("reuse", inference, LINE, spec, load_tracker(f"tracker-{robot}"), slots=slots)
     return trajectories(trial, tasks_of_each_kind(spec.reach))
 
 
@@ -120,8 +123,9 @@ def retrained(high_level: str) -> Data:
     """A high-level policy that was learned on a robot, on tasks of each kind that its tracker is fast enough for."""
     module, _, robot = high_level.removeprefix("high-level-").rpartition("-")
     spec, tracker = load_robot(robot), load_tracker(f"tracker-{robot}")
-    trial = Trial("retrain", load_inference(module), spec, tracker, high_level=load_high_level(high_level))
-    return drawn(trajectories(trial, tasks_of_each_kind(tracker.tracker.reach, module.removesuffix("-noise-0"))))
+    trial = Trial("retrain", load_inference(module), LINE, spec, tracker, high_level=load_high_level(high_level))
+    reach = tuple(tracker.tracker.families.ranges.items())
+    return drawn(trajectories(trial, tasks_of_each_kind(reach, module.removesuffix("-noise-0"))))
 
 
 def projections() -> Data:

@@ -12,27 +12,28 @@ from matplotlib.patches import Circle
 
 from rebody.report.style import BELIEF, TASKS, TRUTH
 from rebody.report.thesis.data import Data, split
-from rebody.tasks import GOAL, JUMP, STAND, VELOCITY, base_task
+from rebody.tasks import Family
+from rebody.tasks.line import GOAL, JUMP, LINE, STAND, VELOCITY
 from rebody.types import Task
 
 Panel = Callable[[Axes, Data], Any]
 
 LETTERS_PER_INCH = 15
 BASE_TASKS = {
-    2 * GOAL + 1: ("goal in front", "#b5403c"),
-    2 * GOAL: ("goal behind", "#2b6f9e"),
-    2 * VELOCITY + 1: ("run forward", "#e0a526"),
-    2 * VELOCITY: ("run backward", "#4f9a6b"),
-    2 * STAND + 1: ("stand, pitch above 0", "#7d4e9e"),
-    2 * STAND: ("stand, pitch below 0", "#5a5a5a"),
-    2 * JUMP + 1: ("jump", "#c2557f"),
+    (GOAL.name, "front"): ("goal in front", "#b5403c"),
+    (GOAL.name, "back"): ("goal behind", "#2b6f9e"),
+    (VELOCITY.name, "front"): ("run forward", "#e0a526"),
+    (VELOCITY.name, "back"): ("run backward", "#4f9a6b"),
+    (STAND.name, "front"): ("stand, pitch above 0", "#7d4e9e"),
+    (STAND.name, "back"): ("stand, pitch below 0", "#5a5a5a"),
+    (JUMP.name, "front"): ("jump", "#c2557f"),
 }
-"""Name and colour by the number that `base_task` gives."""
+"""Name and colour by family and direction."""
 SERIES = {
-    GOAL: ("position_m", "x [m]"),
-    VELOCITY: ("velocity_m_s", "velocity [m/s]"),
-    STAND: ("pitch_rad", "pitch [rad]"),
-    JUMP: ("vz_max_m_s", "largest vertical speed of 1 s [m/s]"),
+    GOAL.name: ("position_m", "x [m]"),
+    VELOCITY.name: ("velocity_m_s", "velocity [m/s]"),
+    STAND.name: ("pitch_rad", "pitch [rad]"),
+    JUMP.name: ("vz_max_m_s", "largest vertical speed of 1 s [m/s]"),
 }
 """Of each family: what is to reach the target, and its label."""
 EPISODES = 12
@@ -108,12 +109,12 @@ def _colour(log: Data, episode: int):
 # episodes on several families
 
 
-def ways(family: int) -> Panel:
+def ways(family: Family) -> Panel:
     """A few episodes of each base task of a family, dotted what was hidden."""
-    series, label = SERIES[family]
+    series, label = SERIES[family.name]
 
     def panel(axes: Axes, log: Data) -> None:
-        for i in np.flatnonzero(log["family"] == family)[:: EPISODES // SHOWN]:
+        for i in np.flatnonzero(log["family"] == LINE.index(family.name))[:: EPISODES // SHOWN]:
             _, colour = BASE_TASKS[labels(log)[i]]
             axes.plot(log["time_s"], log[series][:, i], color=colour, lw=1.2)
             axes.axhline(float(log["target"][i]), color=colour, lw=0.8, ls=":")
@@ -128,8 +129,9 @@ def points(name: str, title: str = "", behind: str | None = None) -> Panel:
     def panel(axes: Axes, log: Data) -> None:
         if behind is not None:
             axes.plot(*log[behind].reshape(-1, 2).T, ".", color="#d0d0d0", ms=7, label="on the toy")
-        for number, (label, colour) in BASE_TASKS.items():
-            x, y = log[name][:, np.array(labels(log)) == number].reshape(-1, 2).T
+        for base_task, (label, colour) in BASE_TASKS.items():
+            is_of_task = [each == base_task for each in labels(log)]
+            x, y = log[name][:, is_of_task].reshape(-1, 2).T
             if x.size:
                 axes.plot(x, y, ".", color=colour, ms=3, label=label)
         axes.set(xticks=[], yticks=[], title=title)
@@ -138,9 +140,10 @@ def points(name: str, title: str = "", behind: str | None = None) -> Panel:
     return panel
 
 
-def labels(log: Data) -> list[int]:
-    """The number of each episode's base task."""
-    return np.asarray(base_task(Task(log["family"], log["target"]))).tolist()
+def labels(log: Data) -> list[tuple[str, str]]:
+    """Family and direction of each episode's task."""
+    names = [(family.name, direction) for family in LINE for direction in family.direction_names]
+    return [names[number] for number in LINE.base_task(Task(log["family"], log["target"][:, None]))]
 
 
 # the toy

@@ -15,7 +15,7 @@ from rebody.agents.rollout import Episodes, rollout_on_toy
 from rebody.agents.slots import OneSlot
 from rebody.bodies.toys import Disturbance
 from rebody.inference.mixture.padded import MixturePrior
-from rebody.tasks import achieved_by_way_of
+from rebody.tasks.quantities import length
 from rebody.types import AnyArray, Belief, GlobalState, Task
 
 KNOWN_FROM = 20
@@ -27,7 +27,7 @@ HOLD = 5
 def act(module: Inference, tasks: Task, disturbance: Disturbance) -> Episodes:
     """What the module believes while its own policy acts on the toy."""
     agent = build_agent("reuse", module, horizon=1)
-    return rollout_on_toy(agent, module.toy, tasks, module.contract.reward, disturbance)
+    return rollout_on_toy(agent, module.toy, tasks, module.contract.families, disturbance)
 
 
 class TrackingToy(ReuseAgent):
@@ -39,14 +39,15 @@ class TrackingToy(ReuseAgent):
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """The subgoal of the slot, and the action that brings it about."""
         subgoal = super().command(state, belief, decision).subgoal
-        actions = self.toy.actions
+        families, actions = self.families, self.toy.actions
         steps = jnp.linspace(-1.0, 1.0, 41)
         candidates = jnp.concatenate([steps[:, None] * jnp.eye(actions)[i] for i in range(actions)])
 
         def outcome(action: Float[AnyArray, " action"]) -> Float[AnyArray, "*batch"]:
             held = jnp.broadcast_to(action, (*state.x.shape, actions))
             states = self.toy.imagine(state, lambda _: held, HOLD)
-            return jnp.abs(achieved_by_way_of(subgoal.slot, states) - subgoal.value)
+            reached = families.achieved_by_way_of(subgoal.slot, states)
+            return length(families.difference(subgoal.slot, reached, subgoal.value))
 
         nearest = jnp.argmin(jax.vmap(outcome)(candidates), axis=0)
         return Command(candidates[nearest], subgoal)
@@ -56,16 +57,16 @@ def slots_of_clusters(module: Inference, tasks: Task, disturbance: Disturbance) 
     """For each component of the module's mixture, the slot that earns most on the toy; no labels are used."""
     mixture = module.parts.mixture
     assert mixture is not None
-    families = module.contract.families
-    earned = np.stack([_earned(module, mixture, family, tasks, disturbance) for family in families])
-    return np.asarray(families, np.int32)[np.argmax(earned, axis=0)]
+    slots = range(len(module.contract.families))
+    earned = np.stack([_earned(module, mixture, slot, tasks, disturbance) for slot in slots])
+    return np.argmax(earned, axis=0).astype(np.int32)
 
 
-def _earned(module: Inference, mixture: MixturePrior, family: int, tasks: Task, disturbance: Disturbance):
+def _earned(module: Inference, mixture: MixturePrior, slot: int, tasks: Task, disturbance: Disturbance):
     """Mean reward of the decisions in which each component was believed, all subgoals in one slot."""
-    reuse = build_agent("reuse", module, slots=OneSlot(family))  # as far ahead as on a robot
+    reuse = build_agent("reuse", module, slots=OneSlot(slot))  # as far ahead as on a robot
     tracking = TrackingToy(**{field.name: getattr(reuse, field.name) for field in fields(reuse)})
-    episodes = rollout_on_toy(tracking, module.toy, tasks, module.contract.reward, disturbance)
+    episodes = rollout_on_toy(tracking, module.toy, tasks, module.contract.families, disturbance)
     believed = eqx.filter_jit(mixture.component)(episodes.belief.mean)[KNOWN_FROM - 1 : -1]
     is_component = np.asarray(believed)[..., None] == np.arange(len(mixture.active))
     reward = np.asarray(episodes.reward)[KNOWN_FROM:, :, None]

@@ -18,7 +18,6 @@ from rebody.jax_settings import own_jax_settings
 from rebody.nn import MLP
 from rebody.ranges import check_ranges
 from rebody.store import load_artifact, tree_hash
-from rebody.tasks import family_names
 from rebody.training.card import save
 from rebody.training.classifier.config import ClassifierConfig
 from rebody.training.classifier.data import KNOWN_FROM, act, slots_of_clusters
@@ -85,7 +84,7 @@ def initial_state(module: Inference, config: ClassifierConfig, key: PRNGKeyArray
     """A fresh network."""
     families = module.contract.families
     net = MLP(module.parts.module.encoder.latent, len(families), config.hidden, key=key)
-    classifier = SlotClassifier(net, families)
+    classifier = SlotClassifier(net)
     return RunState(classifier, _optimiser(config).init(eqx.filter(classifier, eqx.is_array)), jnp.zeros((), jnp.int32))
 
 
@@ -107,8 +106,8 @@ def learn(
 
 def cross_entropy(classifier: SlotClassifier, seen: Beliefs) -> Float[Array, ""]:
     """Binary, per slot."""
-    wanted = seen.family[:, None] == np.asarray(classifier.families)
-    return optax.sigmoid_binary_cross_entropy(classifier.logits(seen.belief), wanted.astype(jnp.float32)).mean()
+    logits = classifier.logits(seen.belief)
+    return optax.sigmoid_binary_cross_entropy(logits, jax.nn.one_hot(seen.family, logits.shape[-1])).mean()
 
 
 def save_slots(
@@ -126,7 +125,7 @@ def save_slots(
         inference=module.name,
         inference_hash=tree_hash(module.parts.module),
         latent=module.parts.module.encoder.latent,
-        families=classifier.families,
+        families=module.contract.families.names,
         hidden=config.hidden,
         components=len(slots),
         training=run.training(config),
@@ -139,7 +138,7 @@ def save_slots(
             rows[f"wrong slots by {name}, {where} toys, from {KNOWN_FROM} decisions on"] = f"{100 * wrong:.3f} %"
     if module.parts.mixture is not None:
         active = np.flatnonzero(np.asarray(module.parts.mixture.active))
-        rows["slots of clusters"] = ", ".join(f"{k}: {family_names()[slots[k]]}" for k in active)
+        rows["slots of clusters"] = ", ".join(f"{k}: {module.contract.families[slots[k]].name}" for k in active)
     what = (
         f"Chooses a tracker's slot from a belief of '{module.name}': a classifier trained with labels on the toy, and "
         f"a slot for each of the mixture's components, found without labels as the one that earns most on the toy."

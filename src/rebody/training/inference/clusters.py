@@ -6,7 +6,6 @@ from jaxtyping import Float, Int
 
 from rebody.inference.mixture import DirichletProcessMixture
 from rebody.inference.mixture.padded import Clusters, recall, remember
-from rebody.tasks import base_task
 from rebody.training.inference.config import MetaConfig, MixtureConfig
 from rebody.training.inference.episodes import Episodes
 from rebody.types import Belief
@@ -57,7 +56,7 @@ def sample_beliefs(
     time = time + begin
     latent = draw(jax.tree.map(lambda leaf: np.asarray(leaf)[episode, time], episodes.belief), config, rng)
     task = jax.tree.map(lambda leaf: np.asarray(leaf)[episode, time - 1], episodes.task)
-    return latent, np.asarray(base_task(task))
+    return latent, np.asarray(config.families.base_task(task))
 
 
 def draw(belief: Belief, config: MetaConfig, rng: np.random.Generator) -> Float[np.ndarray, "point clustered"]:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from rebody.agents.parts import told_view
+from rebody.agents.parts import module_places, told_view
 from rebody.bodies.toys import Randomisation
 from rebody.control.high_level import PolicyView
 from rebody.control.sac import SACConfig
@@ -13,17 +13,15 @@ from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
 from rebody.inference.mixture.settings import MixtureConfig
 from rebody.ranges import Copies, Count, Decisions, Episodes, NotNegative, Number, Positive, Share
-from rebody.tasks import FAMILIES, RewardForm, TaskDistribution
+from rebody.tasks import FamilySet
 
 
 @dataclass(frozen=True)
 class MetaConfig:
     """What is learned, on which tasks, and for how long."""
 
-    tasks: TaskDistribution
-    """Base tasks and their target ranges."""
-    reward: RewardForm
-    """Form of the reward."""
+    families: FamilySet
+    """What tasks there are, and what each pays."""
     inference: InferenceConfig
     """Encoder, decoder and their loss."""
     sac: SACConfig
@@ -101,9 +99,6 @@ class MetaConfig:
             raise RebodyError(
                 f"--mixture.maximum {self.mixture.maximum} is too much for a latent of {self.inference.latent}."
             )
-        for task in self.tasks.base_tasks:
-            if task.low > task.high or task.low == task.high == 0:
-                raise RebodyError(f"a base task of {task.family} cannot have targets from {task.low} to {task.high}.")
         if (self.inference.window or 1) > self.decisions:
             raise RebodyError(
                 f"--inference.window {self.inference.window} is longer than --decisions {self.decisions}."
@@ -116,20 +111,15 @@ class MetaConfig:
         Where the latent is not split no place is seen as a distance, so it sees what the encoder sees as it is, too.
         """
         scales = dict(zip(self.policy_fields, self.policy_scales, strict=True))
-        if not self.inference.places:
+        places = module_places(self.inference, self.families)
+        if not places:
             scales = dict(zip(self.inference.fields, self.inference.scales, strict=True)) | scales
-        return PolicyView(tuple(scales), tuple(scales.values()), self.inference.places)
+        return PolicyView(tuple(scales), tuple(scales.values()), places)
 
     @property
     def told_view(self) -> PolicyView:
         """What the policy that is told its task sees."""
-        return told_view(self.policy_view, self.target_ranges)
-
-    @property
-    def target_ranges(self) -> dict[str, tuple[float, float]]:
-        """Smallest and largest target of each family, in the order of their indices."""
-        names = [FAMILIES[index].name for index in self.tasks.families]
-        return {name: self.tasks.target_range(name) for name in names}
+        return told_view(self.policy_view, self.families)
 
     @property
     def inference_iterations(self) -> int:

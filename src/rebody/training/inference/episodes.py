@@ -12,7 +12,8 @@ from rebody.bodies.toys import Randomisation, Toy, ToyState, no_disturbance
 from rebody.control.sac import Actor
 from rebody.inference import Encoder, InferenceModule
 from rebody.store import Artifact
-from rebody.tasks import TaskDistribution, reward
+from rebody.tasks import FamilySet
+from rebody.tasks.family_set import sample_episodes
 from rebody.training.inference.config import MetaConfig
 from rebody.types import AnyArray, Belief, GlobalState, Task, Transition
 
@@ -21,22 +22,23 @@ from rebody.types import AnyArray, Belief, GlobalState, Task, Transition
 class ToyWorld:
     """The tasks and disturbances that a module was trained on, out of its artifact."""
 
-    tasks: TaskDistribution
+    families: FamilySet
     randomisation: Randomisation
 
     @classmethod
     def of(cls, module: Artifact) -> "ToyWorld":
-        """From the artifact's training settings; RebodyError where they do not tell."""
-        training = module.config["training"]
-        said = {name: training[name] for name in ("tasks", "randomisation") if name in training}
+        """From the artifact's settings; RebodyError where they do not tell."""
+        parts = {"families": module.config["contract"], "randomisation": module.config["training"]}
+        said = {name: part[name] for name, part in parts.items() if name in part}
         return understood(said, cls, module.name)
 
     def draw(self, key: PRNGKeyArray, episodes: int, decisions: int, switch_share: float, *, disturbed: bool):
         """Active tasks [time, episode], and how each episode's toy departs from the nominal one."""
         task_key, disturbance_key = jax.random.split(key)
-        tasks = self.tasks.sample_episodes(task_key, episodes, decisions, switch_share)
+        tasks = sample_episodes(self.families, task_key, episodes, decisions, switch_share)
         rough = self.randomisation.sample(disturbance_key, (episodes,))
-        return jax.tree.map(lambda leaf: leaf.T, tasks), rough if disturbed else no_disturbance((episodes,))
+        disturbance = rough if disturbed else no_disturbance((episodes,))
+        return jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), tasks), disturbance
 
 
 class Roles(eqx.Module):
@@ -76,7 +78,8 @@ def collect(
     """
     task_key, start_key, observe_key, held_key, walk_key = jax.random.split(key, 5)
     shape = (config.episodes,)
-    task = config.tasks.sample_episodes(task_key, config.episodes, config.decisions, config.switch_share)
+    families = config.families
+    task = sample_episodes(families, task_key, config.episodes, config.decisions, config.switch_share)
     body = _random_start(toy, config, start_key)
     seen = _observe(toy, body, config, observe_key)
     encoder, interpret = module.encoder, module.decoder.interpret
@@ -93,14 +96,14 @@ def collect(
         action = jnp.where(roles.decides[:, None], actor(observation), sampled)
         action = jnp.where(roles.wanders[:, None], held, action)
         body = toy.step(body, action, step_key)
-        earned = reward(task, toy.observe(body), config.reward)
+        earned = families.reward(task, toy.observe(body))
         now_seen = _observe(toy, body, config, noise_key)
         carry, belief = encoder.step(carry, Transition(seen, earned, now_seen))
         return (body, now_seen, carry, belief, held), (now_seen, belief, action, earned)
 
     walk = (body, seen, encoder.initial(shape), belief, held)
     keys = jax.random.split(walk_key, config.decisions)
-    active = jax.tree.map(lambda leaf: leaf.T, task)
+    active = jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), task)
     _, (states, beliefs, actions, rewards) = jax.lax.scan(decide, walk, (active, keys))
     along = (_prepend(seen, states), _prepend(belief, beliefs), actions, rewards)
     return Episodes(task, *jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), along))

@@ -1,5 +1,6 @@
 """What a meta-training run has reached, measured on the toy with tasks that it never trains on."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import jax
@@ -12,7 +13,9 @@ from rebody.agents.rollout import Episodes, rollout_on_toy
 from rebody.bodies.toys import Toy
 from rebody.inference.contract import Contract
 from rebody.inference.probe import Probe, fit_probe
-from rebody.tasks import base_task, family_index
+from rebody.tasks import Family, FamilySet
+from rebody.tasks.figures import Series
+from rebody.tasks.quantities import length
 from rebody.training.held_out import errors_of
 from rebody.training.inference.clusters import agreement, draw, new_mixture
 from rebody.training.inference.config import MetaConfig
@@ -20,7 +23,7 @@ from rebody.training.inference.episodes import ToyWorld
 from rebody.types import DECISION_DT, Task
 
 BASE_TASK_AT = 10
-"""Decisions after which the base task (family and sign) should be known."""
+"""Decisions after which the base task (family and direction) should be known."""
 PROBED_FROM = 20
 """A probe is fitted on the beliefs from this decision on."""
 SHARP_AT = 50
@@ -33,6 +36,7 @@ CLUSTERED = (2_000, 10_000)
 class Outcome:
     """Held-out tasks and what was done on them."""
 
+    families: FamilySet
     tasks: Task  # the active ones [time, episode]
     episodes: Episodes
 
@@ -45,14 +49,14 @@ class Outcome:
     def figures(self) -> dict[str, float]:
         """Final errors of each family, and the return."""
         last = jax.tree.map(lambda leaf: leaf[-1], self.tasks)
-        return errors_of(last, self.episodes.state) | {"return": self.total_return}
+        return errors_of(self.families, last, self.episodes.state) | {"return": self.total_return}
 
 
 def measure(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
     """Final errors [m, m/s, rad], return and the oracle's, and how sharply beliefs read out."""
     probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
     oracle = act("oracle", parts, toy, config, held_out)
-    return outcome.figures | {"oracle return": oracle.total_return} | _readings(probe, outcome, config)
+    return outcome.figures | {"oracle return": oracle.total_return} | _readings(probe, outcome)
 
 
 def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
@@ -62,8 +66,8 @@ def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig, held_o
     figures = outcome.figures
     for kind in ("bayes", "oracle"):
         figures[f"{kind} return"] = act(kind, parts, toy, config, held_out).total_return
-    figures |= _readings(probe, outcome, config)
-    figures |= _sharpness(probe, act("reuse", parts, toy, config, held_out, disturbed=True), config)
+    figures |= _readings(probe, outcome)
+    figures |= _sharpness(probe, act("reuse", parts, toy, config, held_out, disturbed=True))
     figures |= _changes(probe, act("reuse", parts, toy, config, held_out, switch_share=1.0))
     return figures | (_clusters(outcome, config) if config.prior == "mixture" else {})
 
@@ -81,12 +85,12 @@ def act(
 ) -> Outcome:
     """An agent of a named kind on held-out tasks; the seeds are none that training uses."""
     key, decisions = jax.random.fold_in(jax.random.key(2**31 - 1), seed), round(config.held_out_s / DECISION_DT)
-    world = ToyWorld(config.tasks, config.randomisation)
+    world = ToyWorld(config.families, config.randomisation)
     tasks, disturbance = world.draw(key, held_out, decisions, switch_share, disturbed=disturbed)
     inference = Inference("in training", contract_of(config), parts, toy)
     agent = build_agent(kind, inference, tasks, horizon=1)
-    episodes = rollout_on_toy(agent, toy, tasks, config.reward, disturbance)
-    return Outcome(*jax.tree.map(np.asarray, (tasks, episodes)))
+    episodes = rollout_on_toy(agent, toy, tasks, config.families, disturbance)
+    return Outcome(config.families, *jax.tree.map(np.asarray, (tasks, episodes)))
 
 
 def contract_of(config: MetaConfig) -> Contract:
@@ -94,46 +98,45 @@ def contract_of(config: MetaConfig) -> Contract:
     return Contract(
         fields=config.inference.fields,
         window=config.inference.window,
-        target_ranges=config.target_ranges,
-        reward=config.reward,
+        families=config.families,
     )
 
 
 def fit(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int, *, disturbed: bool = False) -> Probe:
     """A probe of other episodes than those that figures are taken on."""
     outcome = act("reuse", parts, toy, config, held_out, seed=3 if disturbed else 1, disturbed=disturbed)
-    return probe_of(outcome.tasks, outcome.episodes)
+    return probe_of(outcome.families, outcome.tasks, outcome.episodes)
 
 
-def probe_of(tasks: Task, episodes: Episodes) -> Probe:
+def probe_of(families: FamilySet, tasks: Task, episodes: Episodes) -> Probe:
     """What can be read linearly from the beliefs of episodes."""
     latent = np.asarray(episodes.belief.mean)[PROBED_FROM:]
-    active = jax.tree.map(lambda leaf: leaf[PROBED_FROM:].ravel(), tasks)
-    return fit_probe(latent.reshape(-1, latent.shape[-1]), active.family, active.target)
+    family, target = (np.asarray(leaf)[PROBED_FROM:] for leaf in (tasks.family, tasks.target))
+    return fit_probe(families, latent.reshape(-1, latent.shape[-1]), family.ravel(), target.reshape(-1, families.size))
 
 
-def _readings(probe: Probe, outcome: Outcome, config: MetaConfig) -> dict[str, float]:
+def _readings(probe: Probe, outcome: Outcome) -> dict[str, float]:
     """Share of right base tasks, early and later on, and R^2 of each family's target."""
-    _, target = read(probe, outcome)
     right = is_right(probe, outcome)
     figures = {"base task": float(right[BASE_TASK_AT - 1].mean()), "base task later": float(right[PROBED_FROM:].mean())}
-    for name, of_family in _by_family(outcome.tasks, config):
-        wanted = outcome.tasks.target[PROBED_FROM:, of_family]
-        figures[f"{name} R2"] = float(1 - np.var(target[PROBED_FROM:, of_family] - wanted) / np.var(wanted))
+    for family, missed, wanted in _by_family(probe, outcome):
+        missed, wanted = missed[PROBED_FROM:], wanted[PROBED_FROM:]
+        figures[f"{family.name} R2"] = float(1 - _spread(missed) / _spread(wanted))
     return figures
 
 
-def _sharpness(probe: Probe, outcome: Outcome, config: MetaConfig) -> dict[str, float]:
+def _sharpness(probe: Probe, outcome: Outcome) -> dict[str, float]:
     """Median distance between the target that a disturbed toy's belief speaks of and the true one."""
-    _, target = read(probe, outcome)
-    apart = np.abs(target - outcome.tasks.target)[SHARP_AT]
-    return {f"{name} read, disturbed": float(np.median(apart[of])) for name, of in _by_family(outcome.tasks, config)}
+    return {
+        f"{family.name} read, disturbed": float(np.median(length(missed[SHARP_AT])))
+        for family, missed, _ in _by_family(probe, outcome)
+    }
 
 
 def _changes(probe: Probe, outcome: Outcome) -> dict[str, float]:
     """Decisions until a new base task is read rightly (median; all that are left, where it never is), and how often a
     right reading is lost again."""
-    label = base_task(outcome.tasks)
+    label = outcome.families.base_task(outcome.tasks)
     is_new = np.diff(label, axis=0) != 0
     right = is_right(probe, outcome)
     after = [right[t + 1 :, i] for t, i in np.argwhere(is_new)]
@@ -147,13 +150,14 @@ def _clusters(outcome: Outcome, config: MetaConfig) -> dict[str, float]:
     """Clusters of beliefs after `PROBED_FROM` decisions, fitted anew, against base tasks and families."""
     rng = np.random.default_rng(0)
     belief = jax.tree.map(lambda leaf: leaf[PROBED_FROM:].reshape(-1, leaf.shape[-1]), outcome.episodes.belief)
-    latent, label = draw(belief, config, rng), np.asarray(base_task(outcome.tasks))[PROBED_FROM:].ravel()
+    latent, active = draw(belief, config, rng), jax.tree.map(lambda leaf: leaf[PROBED_FROM:], outcome.tasks)
+    label, family = np.asarray(outcome.families.base_task(active)).ravel(), np.asarray(active.family).ravel()
     figures = {}
     for size in CLUSTERED:
         chosen = rng.choice(len(latent), min(size, len(latent)), replace=False)
         mixture = new_mixture(config.mixture, rng).fit(latent[chosen])
         cluster = mixture.predict(latent[chosen])
-        agrees, of_families = agreement(cluster, label[chosen]), agreement(cluster, label[chosen] // 2)
+        agrees, of_families = agreement(cluster, label[chosen]), agreement(cluster, family[chosen])
         figures |= {
             f"K of {size} beliefs": float(mixture.n_components_),
             f"purity of {size} beliefs": agrees["purity"],
@@ -164,18 +168,29 @@ def _clusters(outcome: Outcome, config: MetaConfig) -> dict[str, float]:
     return figures
 
 
-def read(probe: Probe, outcome: Outcome) -> tuple[Int[np.ndarray, "time episode"], Float[np.ndarray, "time episode"]]:
+def read(
+    probe: Probe, outcome: Outcome
+) -> tuple[Int[np.ndarray, "time episode"], Float[np.ndarray, "time episode axis"]]:
     """Family and target that each belief speaks of."""
     family, target = probe(outcome.episodes.belief)
     return np.asarray(family), np.asarray(target)
 
 
 def is_right(probe: Probe, outcome: Outcome) -> Bool[np.ndarray, "time episode"]:
-    """Whether family and sign are read rightly from each belief."""
-    family, target = read(probe, outcome)
-    return (family == outcome.tasks.family) & (target * outcome.tasks.target > 0)
+    """Whether family and direction are read rightly from each belief."""
+    base_task = outcome.families.base_task
+    return np.asarray(base_task(Task(*read(probe, outcome))) == base_task(outcome.tasks))
 
 
-def _by_family(tasks: Task, config: MetaConfig) -> list[tuple[str, Int[np.ndarray, " episode"]]]:
-    """Episodes of each family, by its name."""
-    return [(name, np.flatnonzero(tasks.family[-1] == family_index(name))) for name in config.target_ranges]
+def _by_family(probe: Probe, outcome: Outcome) -> Iterator[tuple[Family, Series, Series]]:
+    """Of each family: what its episodes' targets are read wrongly by, and the targets, [time, episode, size]."""
+    _, target = read(probe, outcome)
+    for i, family in enumerate(outcome.families):
+        of_family = np.flatnonzero(outcome.tasks.family[-1] == i)
+        said, wanted = (np.asarray(each)[:, of_family, : family.size] for each in (target, outcome.tasks.target))
+        yield family, np.asarray(family.quantity.difference(said, wanted)), wanted
+
+
+def _spread(vectors: Series) -> float:
+    """Variance, summed over the numbers of a vector."""
+    return float(np.var(vectors, axis=(0, 1)).sum())

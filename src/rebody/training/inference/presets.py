@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import pi
 
 from rebody.bodies.toys import Randomisation
 from rebody.control.high_level import high_level_sac
 from rebody.inference import InferenceConfig
-from rebody.tasks import BaseTask, TaskDistribution
+from rebody.ranges import interval
+from rebody.tasks import FamilySet
+from rebody.tasks.line import GOAL, JUMP, STAND, VELOCITY, both_ways
 from rebody.training.inference.config import MetaConfig
 
 
@@ -17,8 +18,7 @@ def position() -> MetaConfig:
     The encoder sees x and the reward alone: velocity would add nothing but a robot's gait.
     """
     return MetaConfig(
-        tasks=TaskDistribution((BaseTask("goal", 0.0, 10.0), BaseTask("goal", -10.0, 0.0))),
-        reward="plain",
+        families=FamilySet((GOAL.within(*both_ways(0.0, 10.0), law="plain"),)),
         inference=InferenceConfig(fields=("x",), scales=(10.0,), reward_scale=10.0, latent=2),
         sac=high_level_sac(projections=8, decay_updates=65_000),
         arrival=0.05,
@@ -36,7 +36,7 @@ def position_thesis() -> MetaConfig:
     return replace(
         base,
         toy="position",
-        tasks=TaskDistribution((BaseTask("goal", 0.0, 10.0),)),
+        families=FamilySet((GOAL.within(interval(0.0, 10.0), law="plain"),)),
         inference=replace(base.inference, latent=1),
         policy_fields=("x",),
         policy_scales=(10.0,),
@@ -53,8 +53,7 @@ def goal_velocity() -> MetaConfig:
     encoder has never seen, and drifts with its beliefs.
     """
     return MetaConfig(
-        tasks=TaskDistribution((*_both_ways("goal", 2.0, 15.0), *_both_ways("velocity", 1.0, 3.0))),
-        reward="relative",
+        families=FamilySet((GOAL, VELOCITY)),
         inference=InferenceConfig(fields=("x", "vx"), scales=(10.0, 3.0), reward_scale=1.0, latent=6, kinds=2),
         sac=high_level_sac(projections=16, decay_updates=80_000),
         prior="mixture",
@@ -79,7 +78,7 @@ def goal_velocity_thesis() -> MetaConfig:
     base = goal_velocity()
     return replace(
         base,
-        tasks=TaskDistribution((*_both_ways("goal", 1.0, 25.0), *_both_ways("velocity", 0.5, 3.0))),
+        families=FamilySet((GOAL.within(*both_ways(1.0, 25.0)), VELOCITY.within(*both_ways(0.5, 3.0)))),
         inference=replace(base.inference, scales=(17.0, 3.0)),
         start=(25.0, 3.0),
         disturbed_start=(50.0, 3.0),
@@ -106,7 +105,7 @@ def goal_velocity_stand() -> MetaConfig:
     base = goal_velocity()
     return replace(
         base,
-        tasks=TaskDistribution((*base.tasks.base_tasks, *_both_ways("stand", pi / 6, pi / 2))),
+        families=FamilySet((GOAL, VELOCITY, STAND)),
         toy="full",
         inference=replace(base.inference, fields=("x", "vx", "pitch"), scales=(10.0, 3.0, 1.5), latent=9, kinds=3),
         policy_fields=("vx", "pitch", "pitch_rate"),
@@ -122,7 +121,7 @@ def goal_velocity_jump() -> MetaConfig:
     base = goal_velocity_stand()
     return replace(
         base,
-        tasks=TaskDistribution((*goal_velocity().tasks.base_tasks, BaseTask("jump", 1.5, 3.0))),
+        families=FamilySet((GOAL, VELOCITY, JUMP)),
         inference=replace(base.inference, fields=("x", "vx", "vz"), scales=(10.0, 3.0, 3.0)),
         policy_fields=("vx", "z", "vz"),
         policy_scales=(3.0, 0.5, 3.0),
@@ -132,10 +131,6 @@ def goal_velocity_jump() -> MetaConfig:
 def _noisy(variance: float) -> MetaConfig:
     calm = Randomisation(ripple_amplitude=0.0, pitch_ripple=0.0, lag=0.0, gain=(1.0, 1.0))
     return replace(goal_velocity(), randomisation=calm, observation_noise=variance)
-
-
-def _both_ways(family: str, low: float, high: float) -> tuple[BaseTask, BaseTask]:
-    return BaseTask(family, low, high), BaseTask(family, -high, -low)
 
 
 PRESETS: dict[str, Callable[[], MetaConfig]] = {

@@ -7,7 +7,6 @@ import equinox as eqx
 from rebody.agents.configs import InferenceSettings, ToyPolicySettings
 from rebody.agents.parts import InferenceParts
 from rebody.bodies.toys import Toy, describe_toy
-from rebody.tasks import FAMILIES
 from rebody.training.card import save
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.measure import contract_of, fit, measure_in_depth
@@ -29,13 +28,15 @@ def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run
         training=run.training(config),
     )
     units = {
-        f"{family.name} {figure}": family.unit for family in FAMILIES for figure in ("median", "p95", "read, disturbed")
+        f"{family.name} {figure}": family.unit
+        for family in config.families
+        for figure in ("median", "p95", "read, disturbed")
     }
     condition = f"{held_out} held-out tasks, {config.held_out_s:g} s on the toy"
     rows = {f"{name}, {condition}": f"{value:.5g} {units.get(name, '')}".rstrip() for name, value in figures.items()}
     steps = run.iterations * config.episodes * config.decisions
     what = (
         f"Inference module (encoder, decoder, probe) and the toy's high-level policy, trained on a point mass "
-        f"on {', '.join(contract.target_ranges)} tasks in {steps:,} toy steps. No robot took part."
+        f"on {', '.join(contract.families.names)} tasks in {steps:,} toy steps. No robot took part."
     )
     return save("inference", settings, parts, run, title, what, rows)

@@ -14,19 +14,19 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
-from rebody.agents.parts import InferenceParts, load_inference, task_code
+from rebody.agents.parts import InferenceParts, load_inference
 from rebody.bodies.toys import Toy, make_toy
 from rebody.control import sac
-from rebody.control.high_level import HighLevelPolicy, PolicyView, TaskCode
+from rebody.control.high_level import HighLevelPolicy, PolicyView
+from rebody.control.places import TaskCode, numbers_of, places_of
 from rebody.control.sac import SACBatch, SACState
 from rebody.errors import RebodyError
 from rebody.inference.mixture.padded import Clusters, clusters_of, no_clusters
 from rebody.inference.module import Evidence, InferenceModule, loss
 from rebody.inference.prior import Prior, SplitPrior, unit_gaussian
-from rebody.inference.probe import Probe
+from rebody.inference.probe import unfitted
 from rebody.jax_settings import own_jax_settings
 from rebody.ranges import check_ranges
-from rebody.tasks import base_task
 from rebody.training.arrival import arrival_bonus
 from rebody.training.descent import descend
 from rebody.training.inference.clusters import refit
@@ -103,7 +103,7 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
         if iteration < config.inference_iterations:
             replay = refresh_beliefs(module.encoder, replay, config.episodes // 2)
             # it acts in no episode itself: later ones, of a policy that hardly explores, would lead it astray
-            told = with_tasks(replay, task_code(config.target_ranges))
+            told = with_tasks(replay, TaskCode(places_of(config.families)))
             privileged, learned = update_policy(privileged, told, stored, config, config.told_view, keys[2])
             metrics |= {f"told/{name}": value for name, value in learned.items()}
         interpreted = eqx.tree_at(lambda e: e.belief, replay, module.decoder.interpret(replay.belief))
@@ -128,9 +128,10 @@ def latent_prior(clusters: Clusters, config: MetaConfig) -> Prior:
 def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: str | None = None) -> RunState:
     """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
-    module = InferenceModule(config.inference, toy.actions, module_key)
+    module = InferenceModule(config.inference, config.families, toy.actions, module_key)
     seen = config.policy_view.size(config.inference.latent)
-    seen_told = config.told_view.size(2 * len(config.tasks.families))
+    told = places_of(config.families)
+    seen_told = config.told_view.size(len(told) + numbers_of(told))
     policy, privileged = (sac.initial_state(size, toy.actions, config.sac, sac_key) for size in (seen, seen_told))
     clusters = no_clusters(config.mixture.maximum, config.inference.clustered)
     if init_from is not None:
@@ -166,15 +167,7 @@ def trained_parts(state: RunState, config: MetaConfig) -> InferenceParts:
         for policy, view in ((state.sac, config.policy_view), (state.privileged, config.told_view))
     )
     mixture = jax.tree.map(jnp.asarray, state.clusters.prior) if config.prior == "mixture" else None
-    return InferenceParts(
-        state.module, by_belief, by_task, unfitted_probe(config.inference.latent, config.tasks.families), mixture
-    )
-
-
-def unfitted_probe(latent: int, families: tuple[int, ...]) -> Probe:
-    """A probe that reads nothing."""
-    weights = jnp.zeros((latent + 1, len(families)))
-    return Probe(jnp.asarray(families), weights, weights)
+    return InferenceParts(state.module, by_belief, by_task, unfitted(config.families, config.inference.latent), mixture)
 
 
 @eqx.filter_jit
@@ -211,8 +204,15 @@ def update_policy(
 
 def with_tasks(episodes: Episodes, code: TaskCode) -> Episodes:
     """The same episodes with the truth in place of what was believed; the last task lasts beyond the end."""
-    active = jax.tree.map(lambda leaf: jnp.concatenate([leaf, leaf[..., -1:]], axis=-1), episodes.task)
+    time = episodes.task.family.ndim - 1
+    active = jax.tree.map(lambda leaf: _with_last(leaf, time), episodes.task)
     return eqx.tree_at(lambda e: e.belief, episodes, code(active))
+
+
+def _with_last(leaf: AnyArray, axis: int) -> Array:
+    """The last entry along an axis twice."""
+    last = jax.lax.slice_in_dim(leaf, -1, None, axis=axis)
+    return jnp.concatenate([leaf, last], axis=axis)
 
 
 def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray) -> Evidence:
@@ -232,8 +232,8 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
     believed, explained = at(seen, replay.task), at(decoded, replay.task)
     return Evidence(
         window=Transition(at(seen, replay.state), at(seen, replay.reward), at(seen + 1, replay.state)),
-        base_task=base_task(believed),
-        same_task=believed.target[:, :, None] == explained.target[:, None],
+        base_task=config.families.base_task(believed),
+        same_task=jnp.all(believed.target[:, :, None] == explained.target[:, None], axis=-1),
         previous=at(decoded, replay.state),
         action=at(decoded, replay.action),
         reward=at(decoded, replay.reward),

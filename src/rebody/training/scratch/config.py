@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass, field, replace
 
+from rebody.agents.parts import module_places
 from rebody.bodies.robot import Reach
 from rebody.control.flat import FlatView
+from rebody.control.places import Places
 from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
 from rebody.ranges import Copies, Count, Decisions, Episodes, NotNegative, Number, Seconds, Share
+from rebody.tasks import FamilySet
 from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.presets import goal_velocity
 from rebody.training.task_inference import within_reach
@@ -47,6 +50,8 @@ class ScratchConfig:
     told_share: Share = 0.5
     """Share of robots that are told their task, and of control steps that the policy learns from as if it were. While
     nothing is known, a policy that only believes learns to stand still, and from that the module learns nothing."""
+    families: FamilySet = field(default_factory=lambda: goal_velocity().families)
+    """What tasks there are, as far as the robot reaches, and what each pays."""
     inference: InferenceConfig = field(default_factory=lambda: goal_velocity().inference)
     """Encoder, decoder and their loss: those of the toy's module."""
     reward: TrackerReward = field(default_factory=lambda: TrackerReward(relative=0.5, arrival=0.2))
@@ -57,20 +62,24 @@ class ScratchConfig:
 
     def __post_init__(self):
         """RebodyError where a belief cannot say what who is told goes by."""
-        if not self.inference.places:
+        if not self.inference.kinds:
             raise RebodyError("--inference.kinds must be at least 1: a told task is put as a belief about places.")
+
+    @property
+    def places(self) -> Places:
+        """What a belief says the places of."""
+        return module_places(self.inference, self.families)
 
     @property
     def view(self) -> FlatView:
         """What the policy sees."""
-        return FlatView(self.inference.places)
+        return FlatView(self.places)
 
     def meta(self, reach: Reach) -> MetaConfig:
-        """The toy's settings for episodes of robots: `goal-velocity` within reach, one Gaussian as the prior."""
-        base = goal_velocity()
+        """The toy's settings for episodes of robots: tasks within reach, one Gaussian as the prior."""
         return replace(
-            base,
-            tasks=within_reach(base.target_ranges, reach),
+            goal_velocity(),
+            families=within_reach(self.families, reach),
             inference=self.inference,
             prior="gaussian",
             switch_share=self.switch_share,

@@ -22,36 +22,39 @@ from rebody.agents.parts import ScratchParts, load_scratch
 from rebody.agents.rollout import Episodes as Rollouts
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.control import sac
+from rebody.control.command import commands_within
 from rebody.control.flat import FlatPolicy
-from rebody.control.high_level import told_code
+from rebody.control.places import TaskCode
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.inference.module import InferenceModule
 from rebody.inference.prior import SplitPrior, unit_gaussian
+from rebody.inference.probe import unfitted
 from rebody.jax_settings import own_jax_settings
+from rebody.tasks import SHIPPED
+from rebody.tasks.family_set import sample_episodes
 from rebody.training.card import save
 from rebody.training.held_out import act, figures_of, rows_of
 from rebody.training.inference.episodes import Episodes, refresh_beliefs
 from rebody.training.inference.measure import contract_of, probe_of
-from rebody.training.inference.presets import goal_velocity
-from rebody.training.inference.train import load_pretrained, optimiser_of, unfitted_probe, update_inference, with_tasks
+from rebody.training.inference.train import load_pretrained, optimiser_of, update_inference, with_tasks
 from rebody.training.motion import decision, privileged_reward, put_on_feet
 from rebody.training.off_policy import ready_robot
 from rebody.training.replay import store_group
 from rebody.training.run import Metrics, Run, measured
 from rebody.training.scratch.config import ScratchConfig
 from rebody.training.task_inference import TaskInference, begin_inference, infer
-from rebody.types import AnyArray, Belief, GlobalState, Task, global_state
+from rebody.types import POSE_FIELDS, AnyArray, Belief, GlobalState, Task, global_state
 
 
 class ControlSteps(eqx.Module):
     """Control steps of robots; a replay has [group, step, robot]."""
 
     joints: Float[AnyArray, "*steps robot joint"]
-    x: Float[AnyArray, "*steps robot"]
+    pose: Float[AnyArray, "*steps robot 6"]
     action: Float[AnyArray, "*steps robot action"]
     reward: Float[AnyArray, "*steps robot"]
     next_joints: Float[AnyArray, "*steps robot joint"]
-    next_x: Float[AnyArray, "*steps robot"]
+    next_pose: Float[AnyArray, "*steps robot 6"]
 
 
 class Replay(eqx.Module):
@@ -125,17 +128,17 @@ def collect(
     """One group: every robot acts on a hidden task by what it believes, or by what it is told."""
     task_key, action_key = jax.random.split(key)
     meta, encoder = config.meta(batch.spec.reach), state.module.encoder
-    tasks = meta.tasks.sample_episodes(task_key, config.robots, config.decisions, config.switch_share)
+    tasks = sample_episodes(meta.families, task_key, config.robots, config.decisions, config.switch_share)
     tasks = jax.tree.map(np.asarray, tasks)
     batch.reset(rng)
     batch.place(rng.uniform(-config.start, config.start, batch.size))
-    here, first = batch.spec.observe(batch.qpos, batch.qpos), jax.tree.map(lambda leaf: leaf[:, 0], tasks)
+    here, first = batch.observe(), jax.tree.map(lambda leaf: leaf[:, 0], tasks)
     known = begin_inference(encoder, here, first)
     states, beliefs, actions, rewards, steps = [here], [known.belief], [], [], []
     for i in range(config.decisions):
         known = replace(known, task=jax.tree.map(lambda leaf: leaf[:, i], tasks))  # noqa: B023 (used at once)
         now, held = act_for_a_decision(state, known, batch, config, rng, jax.random.fold_in(action_key, i))
-        known, earned = infer(encoder, known, now, meta.reward)
+        known, earned = infer(encoder, known, now, meta.families)
         steps += held
         states.append(known.state)
         beliefs.append(known.belief)
@@ -155,13 +158,15 @@ def act_for_a_decision(
 ) -> tuple[GlobalState, list[ControlSteps]]:
     """Control steps by the same belief; the state after them, and the steps."""
     interpreted, steps = interpret(state.module, known, config), []
+    families, commands = config.families, commands_within(batch.spec.reach, config.families.beside(SHIPPED))
 
     def control_step(i: int) -> None:
-        joints, x, before = batch.joint_state(), batch.x.astype(np.float32), batch.qpos.copy()
-        action = np.asarray(_explore(state.sac.actor, config, joints, x, interpreted, jax.random.fold_in(key, i)))
+        joints, before = batch.joint_state(), batch.pose()
+        pose = before.astype(np.float32)
+        action = np.asarray(_explore(state.sac.actor, config, joints, pose, interpreted, jax.random.fold_in(key, i)))
         batch.step(action)
-        reward = privileged_reward(batch, before, known.task, action, config.reward)
-        steps.append(ControlSteps(joints, x, action, reward, batch.joint_state(), batch.x.astype(np.float32)))
+        reward = privileged_reward(batch, before, known.task, action, families, commands, config.reward)
+        steps.append(ControlSteps(joints, pose, action, reward, batch.joint_state(), batch.pose().astype(np.float32)))
         put_on_feet(batch, rng)
 
     return decision(batch, control_step)[0], steps
@@ -173,7 +178,7 @@ def update_policy(
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
     """Steps of soft actor-critic on stored control steps, with today's beliefs."""
     believed = module.decoder.interpret(replay.episodes.belief)
-    told = with_tasks(replay.episodes, told_code(config.inference.places)).belief
+    told = with_tasks(replay.episodes, TaskCode(config.places)).belief
 
     def batch_of(_: None, key: PRNGKeyArray) -> SACBatch:
         return sample_steps(replay, believed, told, stored, config, key)
@@ -195,16 +200,16 @@ def sample_steps(
     chosen = jax.tree.map(lambda leaf: leaf[group, step, robot], steps)
     per_decision = length // episodes.reward.shape[-1]
 
-    def observation(joints, x, step):
+    def observation(joints, pose, step):
         at = group, robot, step // per_decision
         held = jax.tree.map(lambda yes, no: jnp.where(is_told[:, None], yes[at], no[at]), told, believed)
-        return config.view(joints, x, held)
+        return config.view(joints, pose, held)
 
     return SACBatch(
-        observation=observation(chosen.joints, chosen.x, step),
+        observation=observation(chosen.joints, chosen.pose, step),
         action=chosen.action,
         reward=chosen.reward,
-        next_observation=observation(chosen.next_joints, chosen.next_x, step + 1),
+        next_observation=observation(chosen.next_joints, chosen.next_pose, step + 1),
         terminal=jnp.zeros(size),  # what has fallen goes on
     )
 
@@ -215,7 +220,7 @@ def initial_state(
     """Fresh networks, or those of an artifact, and an empty replay."""
     module_key, sac_key = jax.random.split(key)
     actions, joints = batch.spec.model.nu, batch.joint_state().shape[-1]
-    module = InferenceModule(config.inference, actions, module_key)
+    module = InferenceModule(config.inference, config.families, actions, module_key)
     seen = config.view.size(joints, config.inference.latent)
     policy = sac.initial_state(seen, actions, config.sac, sac_key)
     if init_from is not None:
@@ -236,59 +241,58 @@ def _no_replay(config: ScratchConfig, batch: RobotBatch) -> Replay:
     steps, actions = decisions * batch.spec.steps_per_decision, batch.spec.model.nu
     joints = jnp.zeros((groups, steps, robots, batch.joint_state().shape[-1]))
     per_step, per_decision = jnp.zeros((groups, steps, robots)), jnp.zeros((groups, robots, decisions))
-    between = jnp.zeros((groups, robots, decisions + 1))
+    between, pose = jnp.zeros((groups, robots, decisions + 1)), jnp.zeros((*per_step.shape, len(POSE_FIELDS)))
     latent = jnp.zeros((*between.shape, config.inference.latent))
     acted = jnp.zeros((groups, robots, decisions, actions))
     return Replay(
         Episodes(
-            Task(jnp.zeros(per_decision.shape, jnp.int32), per_decision),
+            Task(jnp.zeros(per_decision.shape, jnp.int32), jnp.zeros((*per_decision.shape, config.families.size))),
             global_state(x=between),
             Belief(latent, latent),
             acted,
             per_decision,
         ),
-        ControlSteps(joints, per_step, jnp.zeros((groups, steps, robots, actions)), per_step, joints, per_step),
+        ControlSteps(joints, pose, jnp.zeros((groups, steps, robots, actions)), per_step, joints, pose),
     )
 
 
 def trained_parts(state: RunState, config: ScratchConfig) -> ScratchParts:
     """What is kept of a run, its probe not yet fitted."""
-    families = goal_velocity().tasks.families
     policy = FlatPolicy(state.sac.averaged_actor, config.view)
-    return ScratchParts(state.module, policy, unfitted_probe(config.inference.latent, families))
+    return ScratchParts(state.module, policy, unfitted(config.families, config.inference.latent))
 
 
 @eqx.filter_jit
 def interpret(module: InferenceModule, known: TaskInference, config: ScratchConfig) -> Belief:
     """What each robot goes by: the first ones are told."""
     robots = jnp.arange(config.robots)[:, None]
-    told, believed = told_code(config.inference.places)(known.task), module.decoder.interpret(known.belief)
+    told, believed = TaskCode(config.places)(known.task), module.decoder.interpret(known.belief)
     return jax.tree.map(lambda yes, no: jnp.where(robots < config.told_share * config.robots, yes, no), told, believed)
 
 
 @eqx.filter_jit
-def _explore(actor: Actor, config: ScratchConfig, joints, x, interpreted: Belief, key: PRNGKeyArray):
-    observation = config.view(joints, x, interpreted)
-    decides = jnp.arange(len(x))[:, None] % config.decides_every == 0
+def _explore(actor: Actor, config: ScratchConfig, joints, pose, interpreted: Belief, key: PRNGKeyArray):
+    observation = config.view(joints, pose, interpreted)
+    decides = jnp.arange(len(pose))[:, None] % config.decides_every == 0
     return jnp.where(decides, actor(observation), actor.sample(observation, key)[0])
 
 
 def measure(parts: ScratchParts, config: ScratchConfig, spec: RobotSpec) -> dict[str, float]:
     """Final error on held-out tasks of each family, return, share that fell."""
-    return figures_of(*act_on(parts, config, spec, seed=0))
+    return figures_of(config.families, *act_on(parts, config, spec, seed=0))
 
 
 def act_on(parts: ScratchParts, config: ScratchConfig, spec: RobotSpec, *, seed: int) -> tuple[Task, Rollouts]:
     """Robots on held-out tasks."""
-    agent = FlatAgent(inferrer=parts.module.encoder, reader=parts.probe, stride=1)
+    agent = FlatAgent(families=config.families, inferrer=parts.module.encoder, reader=parts.probe, stride=1)
     controller, meta = FlatController(parts.policy, parts.module.decoder), config.meta(spec.reach)
-    return act(agent, controller, spec, meta.tasks, meta.reward, config.held_out, config.held_out_s, seed)
+    return act(agent, controller, spec, meta.families, config.held_out, config.held_out_s, seed)
 
 
 def save_scratch(parts: ScratchParts, spec: RobotSpec, config: ScratchConfig, run: Run) -> Path:
     """Measure, fit the probe on other tasks, write artifact and card."""
     figures = measure(parts, config, spec)
-    parts = eqx.tree_at(lambda p: p.probe, parts, probe_of(*act_on(parts, config, spec, seed=1)))
+    parts = eqx.tree_at(lambda p: p.probe, parts, probe_of(config.families, *act_on(parts, config, spec, seed=1)))
     actor = parts.policy.actor
     settings = ScratchSettings(
         robot=spec.name,
@@ -300,7 +304,7 @@ def save_scratch(parts: ScratchParts, spec: RobotSpec, config: ScratchConfig, ru
         projections=config.sac.projections,
         training=run.training(config),
     )
-    rows = rows_of(figures, config.held_out, config.held_out_s)
+    rows = rows_of(config.families, figures, config.held_out, config.held_out_s)
     decisions = run.iterations * config.robots * config.decisions
     what = (
         f"Inference module and joint policy of '{spec.name}', learned together on the robot: nothing is reused. "

@@ -17,17 +17,16 @@ from rebody.agents.configs import StepPredictorSettings
 from rebody.agents.parts import LoadedTracker, load_step_predictor, load_tracker
 from rebody.bodies import RobotBatch, RobotSpec
 from rebody.control.sac import Actor, SACBatch
-from rebody.control.step_predictor import MOST_STEPS, SLOTS, STEP_COST, StepPredictor, steps_of
+from rebody.control.step_predictor import MOST_STEPS, STEP_COST, StepPredictor, is_predictable, steps_of
 from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
 from rebody.store import tree_hash
-from rebody.tasks import FAMILIES
 from rebody.training.card import save
 from rebody.training.motion import tracker_features
 from rebody.training.off_policy import Learner, OffPolicyState, ready_robot, train
 from rebody.training.run import Metrics, Run
-from rebody.training.step_predictor.chase import Chooser, Deciding, Exploring, Fixed, World, advance, begin
+from rebody.training.step_predictor.chase import Chase, Chooser, Deciding, Exploring, Fixed, advance, begin, predictable
 from rebody.training.step_predictor.config import StepPredictorConfig
 
 STRIDES = (1, 2, 5, 10)
@@ -56,13 +55,17 @@ def train_step_predictor(
         raise RebodyError(f"--steps must be at least {MOST_STEPS}: so long can a subgoal be held.")
     loaded = load_tracker(f"tracker-{spec.name}" if tracker is None else tracker)
     check_robot_of(loaded, spec)
+    if not any(map(is_predictable, loaded.tracker.families)):
+        raise RebodyError(
+            f"'{loaded.name}' is told neither places nor speeds along x: there are no strides to predict."
+        )
     settings = {"robot": robot, "tracker": tracker, "seed": seed}
     learner = StepPredictorLearner(spec, config, loaded)
     return train(learner, out, settings, resume=resume, finish=finish, init_from=init_from)
 
 
 @dataclass(frozen=True)
-class StepPredictorLearner(Learner[World]):
+class StepPredictorLearner(Learner[Chase]):
     """(joint state, subgoal) -> how many control steps it will take a frozen tracker."""
 
     name = "step predictor"
@@ -71,15 +74,15 @@ class StepPredictorLearner(Learner[World]):
 
     def sizes(self, batch: RobotBatch) -> tuple[int, int]:
         """Those that the tracker sees, and one number."""
-        return tracker_features(batch, self.tracker.tracker.reach), 1
+        return tracker_features(batch, self.tracker.tracker.families), 1
 
-    def begin(self, batch: RobotBatch, actor: Actor, key: PRNGKeyArray) -> World:
+    def begin(self, batch: RobotBatch, actor: Actor, key: PRNGKeyArray) -> Chase:
         """Robots with a first subgoal."""
-        return begin(batch, self.tracker.tracker.reach, Exploring(actor), self.config, key)
+        return begin(batch, self.tracker.tracker.families, Exploring(actor), self.config, key)
 
     def collect(
-        self, state: OffPolicyState[World], batch: RobotBatch, rng: np.random.Generator, key: PRNGKeyArray
-    ) -> tuple[World, Metrics]:
+        self, state: OffPolicyState[Chase], batch: RobotBatch, rng: np.random.Generator, key: PRNGKeyArray
+    ) -> tuple[Chase, Metrics]:
         """Control steps; what the subgoals that ended earned, how long they were held, how many ended in a fall."""
         chooser, before = Exploring(state.sac.actor), int(state.replay.written)
         for step in range(self.config.steps):
@@ -100,12 +103,12 @@ class StepPredictorLearner(Learner[World]):
     def save(self, actor: Actor, figures: dict[str, float], run: Run) -> Path:
         """A step predictor's artifact; fixed strides are measured beside it."""
         robot, tracker, config = self.spec.name, self.tracker, self.config
-        predictor = StepPredictor(actor, tracker.tracker.reach)
+        predictor = StepPredictor(actor, tracker.tracker.families)
         settings = StepPredictorSettings(
             robot=robot,
             tracker=tracker.name,
             tracker_hash=tree_hash(tracker.tracker),
-            reach=predictor.reach,
+            families=predictor.families,
             observations=actor.observations,
             hidden=config.sac.hidden,
             projections=config.sac.projections,
@@ -141,8 +144,8 @@ def measure(chooser: Chooser, tracker: Tracker, spec: RobotSpec, config: StepPre
         "falls per minute": 60 * np.sum(seen.terminal) / (config.held_out * config.held_out_s),
     }
     slots = seen.observation[:, batch.proprioception().shape[-1] :]  # one-hot, then the values
-    for slot in SLOTS:
-        figures[f"control steps, {FAMILIES[slot].name}"] = np.mean(steps[slots[:, slot] == 1])
+    for name in predictable(tracker.families).names:
+        figures[f"control steps, {name}"] = np.mean(steps[slots[:, tracker.families.index(name)] == 1])
     return {name: float(value) for name, value in figures.items()}
 
 
@@ -150,9 +153,9 @@ def chase(chooser: Chooser, batch: RobotBatch, tracker: Tracker, config: StepPre
     """Every subgoal that ended while robots chased toys, from their rest pose on."""
     rng, key = np.random.default_rng(2**31 - 1), jax.random.key(2**31 - 1)
     batch.reset(rng)
-    world = begin(batch, tracker.reach, chooser, config, key)
+    chased = begin(batch, tracker.families, chooser, config, key)
     ended = [
-        advance(world, batch, tracker, chooser, config, rng, jax.random.fold_in(key, step))
+        advance(chased, batch, tracker, chooser, config, rng, jax.random.fold_in(key, step))
         for step in range(round(config.held_out_s / batch.spec.control_dt))
     ]
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *ended)

@@ -2,12 +2,10 @@
 
 from dataclasses import dataclass, field
 
-from rebody.bodies.description import reach_problems
-from rebody.bodies.robot import Reach
 from rebody.control.sac import SACConfig
 from rebody.control.tracker import TrackerReward
-from rebody.errors import RebodyError
 from rebody.ranges import Copies, Count, NotNegative, Number, Positive, Seconds, Share
+from rebody.tasks import FamilySet
 from rebody.training.off_policy import OffPolicyConfig
 from rebody.training.tracker.commands import CommandDistribution
 
@@ -16,8 +14,8 @@ from rebody.training.tracker.commands import CommandDistribution
 class TrackerConfig(OffPolicyConfig):
     """One training run of a tracker."""
 
-    reach: Reach
-    """What is asked of the robot, but for a margin."""
+    families: FamilySet
+    """What is asked of the robot, within its reach but for a margin."""
     evaluate_every: Count = 100
     """Iterations from one measurement on held-out commands to the next."""
     held_out_s: Seconds = 10.0
@@ -46,8 +44,3 @@ class TrackerConfig(OffPolicyConfig):
     """What the tracker is paid."""
     sac: SACConfig = field(default_factory=lambda: SACConfig(decay_updates=180_000))
     """Hyperparameters of soft actor-critic."""
-
-    def __post_init__(self):
-        """RebodyError for a reach that cannot be asked of any robot."""
-        if problems := reach_problems(self.reach):
-            raise RebodyError(f"--reach: {'; '.join(problems)}.")

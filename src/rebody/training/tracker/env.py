@@ -11,11 +11,12 @@ from gymnasium import spaces
 
 from rebody import inputs
 from rebody.bodies import RobotBatch, load_robot
-from rebody.control.tracker import Command, after, tracker_observation, tracker_reward
+from rebody.control.command import Command, after
+from rebody.control.tracker import tracker_observation, tracker_reward
 from rebody.envs.seeds import body_seed
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
-from rebody.training.motion import motion_of
+from rebody.training.motion import motion_of, no_command
 from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.orders import draw_commands
 from rebody.training.tracker.presets import tracker_preset
@@ -41,7 +42,7 @@ class TrackerEnv(gymnasium.Env):
     @own_jax_settings()
     def observation_space(self) -> spaces.Box:
         """Joint state, then the command."""
-        nothing = Command(np.zeros(1, np.int32), np.zeros(1, np.float32))
+        nothing = no_command(1, self._config.families)
         # the shape alone: a process in which JAX has computed cannot be forked any more
         seen = jax.eval_shape(lambda told: _observation(self._batch.proprioception(), told, self._config), nothing)
         return spaces.Box(-np.inf, np.inf, seen.shape[1:], np.float32)
@@ -66,19 +67,19 @@ class TrackerEnv(gymnasium.Env):
         if told is None:
             raise RebodyError("there is no episode yet: call reset before step.")
         action = inputs.numbers(action, (self._spec.model.nu,), "the action")
-        before = self._batch.qpos.copy()
+        before = self._batch.pose()
         self._batch.step(action[None])
         motion = motion_of(self._batch, before)
         reward = _reward(told, motion, action.astype(np.float32)[None], self._spec.control_dt, config)
-        command: Command = jax.tree.map(np.asarray, after(told, motion))
+        command: Command = jax.tree.map(np.asarray, after(config.families, told, motion))
         self._steps_left -= 1
         self._command = command = self._new_command() if self._steps_left < 0 else command
         return self._observe(command), float(reward[0]), bool(motion.fell[0]), False, {}
 
     def _new_command(self) -> Command:
         key = jax.random.key(self.np_random.integers(2**32, dtype=np.uint32))
-        pitch = self._spec.pitch(self._batch.qpos).astype(np.float32)
-        command = jax.tree.map(np.asarray, draw_commands(key, pitch, self._config))
+        pose = self._batch.pose().astype(np.float32)
+        command = jax.tree.map(np.asarray, draw_commands(key, pose, self._config))
         shortest, longest = segment_steps(self._config, self._spec.control_dt)
         self._steps_left = int(self.np_random.integers(shortest, longest + 1))
         return command
@@ -90,9 +91,9 @@ class TrackerEnv(gymnasium.Env):
 
 @partial(jax.jit, static_argnames="config")
 def _observation(joints: AnyArray, command: Command, config: TrackerConfig) -> AnyArray:
-    return tracker_observation(joints, command, config.reach)
+    return tracker_observation(joints, command, config.families)
 
 
 @partial(jax.jit, static_argnames=("control_dt", "config"))
 def _reward(command: Command, motion, action: AnyArray, control_dt: float, config: TrackerConfig) -> AnyArray:
-    return tracker_reward(command, motion, control_dt, action, config.reach, config.reward)
+    return tracker_reward(command, motion, control_dt, action, config.families, config.reward)

@@ -16,11 +16,12 @@ from jaxtyping import Bool, Float, PRNGKeyArray
 
 from rebody.agents.parts import load_tracker
 from rebody.bodies import RobotBatch
+from rebody.control.command import Command, Motion, after
 from rebody.control.sac import Actor, SACBatch, SACState
-from rebody.control.tracker import Command, Motion, Tracker, after, slots_of, tracker_observation, tracker_reward
+from rebody.control.tracker import Tracker, tracker_observation, tracker_reward
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
-from rebody.training.motion import LastDecision, motion_of, no_command, tracker_features
+from rebody.training.motion import motion_of, no_command, tracker_features
 from rebody.training.off_policy import Learner, OffPolicyState, learn, ready_robot, train
 from rebody.training.run import Run
 from rebody.training.tracker.commands import Share
@@ -28,7 +29,7 @@ from rebody.training.tracker.config import TrackerConfig
 from rebody.training.tracker.orders import Orders, commands, follow_guides, no_orders, renew
 from rebody.training.tracker.report import measure, save_tracker
 from rebody.training.tracker.schedule import schedule, speed_share
-from rebody.types import AnyArray
+from rebody.types import POSE_FIELDS, AnyArray
 
 
 @own_jax_settings()
@@ -48,7 +49,7 @@ def train_tracker(
     such slot as the only one asked for; Interrupted on Ctrl-C.
     """
     spec = ready_robot(robot, config)
-    only, slots = config.commands.only, slots_of(config.reach)
+    only, slots = config.commands.only, config.families.names
     if only not in (None, *slots):
         raise RebodyError(f"'{spec.name}' is not trained for slot '{only}'; it has: {', '.join(slots)}.")
     settings = {"robot": robot, "seed": seed}
@@ -69,7 +70,6 @@ class World(eqx.Module):
     """What is known of the robots beside their physics."""
 
     orders: Orders
-    last: LastDecision
 
 
 @dataclass(frozen=True)
@@ -81,32 +81,32 @@ class TrackerLearner(Learner[World]):
 
     def sizes(self, batch: RobotBatch) -> tuple[int, int]:
         """Joint state and command, and the robot's actuators."""
-        return tracker_features(batch, self.config.reach), self.spec.model.nu
+        return tracker_features(batch, self.config.families), self.spec.model.nu
 
     def row(self, batch: RobotBatch) -> ControlSteps:
         """What happened, whatever was asked for."""
-        joints, moved = batch.proprioception()[:1], np.zeros(1, np.float32)
+        joints, still = batch.proprioception()[:1], np.zeros((1, len(POSE_FIELDS)), np.float32)
         action = np.zeros((1, self.spec.model.nu), np.float32)
-        motion = Motion(moved, moved, moved, moved, np.zeros(1, bool), moved)
-        return ControlSteps(joints, action, joints, motion, no_command(1))
+        motion = Motion(still, still, still, np.zeros(1, bool))
+        return ControlSteps(joints, action, joints, motion, no_command(1, self.config.families))
 
     def begin(self, batch: RobotBatch, actor: Actor, key: PRNGKeyArray) -> World:
         """Robots without orders."""
-        return World(no_orders(batch.size), LastDecision.of(batch))
+        return World(no_orders(batch.size, self.config.families))
 
     def collect(
         self, state: OffPolicyState[World], batch: RobotBatch, rng: np.random.Generator, key: PRNGKeyArray
     ) -> tuple[World, dict[str, Any]]:
         """Control steps under orders; what they earned, and how often robots fell."""
-        config, spec, orders, last = self.config, self.spec, state.world.orders, state.world.last
+        config, spec, orders = self.config, self.spec, state.world.orders
         lasting = schedule(config, int(state.iteration), spec.control_dt)
         for step in range(config.steps):
             order_key, action_key = jax.random.split(jax.random.fold_in(key, step))
             renew(orders, batch, config, lasting, rng, order_key)
             if step % spec.steps_per_decision == 0:
-                follow_guides(orders, last.next(batch), config)
+                follow_guides(orders, batch.observe(), config)
             push(batch, config, rng)
-            joints, before, command = batch.proprioception(), batch.qpos.copy(), commands(orders, batch)
+            joints, before, command = batch.proprioception(), batch.pose(), commands(orders, batch, config.families)
             action = np.asarray(_explore(state.sac.actor, joints, command, action_key, config))
             batch.step(action)
             seen = ControlSteps(joints, action, batch.proprioception(), motion_of(batch, before), command)
@@ -122,11 +122,11 @@ class TrackerLearner(Learner[World]):
 
     def measure(self, actor: Actor) -> dict[str, float]:
         """Errors, falls."""
-        return measure(Tracker(actor, self.config.reach), self.spec, self.config)
+        return measure(Tracker(actor, self.config.families), self.spec, self.config)
 
     def save(self, actor: Actor, figures: dict[str, float], run: Run) -> Path:
         """A tracker's artifact."""
-        return save_tracker(Tracker(actor, self.config.reach), figures, self.spec, self.config, run)
+        return save_tracker(Tracker(actor, self.config.families), figures, self.spec, self.config, run)
 
     def load_actor(self, artifact: str) -> Actor:
         """That of a tracker."""
@@ -145,16 +145,19 @@ class Relabelling(eqx.Module):
 
     def __call__(self, steps: ControlSteps, key: PRNGKeyArray) -> SACBatch:
         """A batch to learn from."""
-        config, motion, action, reach = self.config, steps.motion, steps.action, self.config.reach
-        size = len(motion.pitch)
-        fresh = config.commands.sample(key, motion.pitch - motion.turn, reach, self.speed_share)
+        config, motion, action, families = self.config, steps.motion, steps.action, self.config.families
+        size, before = len(motion.fell), motion.pose - motion.displacement  # right but for places, drawn as distances
+        fresh = config.commands.sample(key, before, families, self.speed_share)
         renewed = jnp.arange(size) < config.relabelled * size
-        command = jax.tree.map(lambda new, old: jnp.where(renewed, new, old), fresh, steps.command)
+        command = Command(
+            jnp.where(renewed, fresh.slot, steps.command.slot),
+            jnp.where(renewed[:, None], fresh.value, steps.command.value),
+        )
         return SACBatch(
-            observation=tracker_observation(steps.joints, command, reach),
+            observation=tracker_observation(steps.joints, command, families),
             action=action,
-            reward=tracker_reward(command, motion, self.control_dt, action, reach, config.reward),
-            next_observation=tracker_observation(steps.next_joints, after(command, motion), reach),
+            reward=tracker_reward(command, motion, self.control_dt, action, families, config.reward),
+            next_observation=tracker_observation(steps.next_joints, after(families, command, motion), families),
             terminal=motion.fell.astype(jnp.float32),
         )
 
@@ -162,7 +165,7 @@ class Relabelling(eqx.Module):
 @eqx.filter_jit
 def experience(seen: ControlSteps, config: TrackerConfig, control_dt: float) -> dict[str, Float[AnyArray, ""]]:
     """What was earned per control step, and how long robots stayed on their feet (thesis, figure 6.12)."""
-    reward = tracker_reward(seen.command, seen.motion, control_dt, seen.action, config.reach, config.reward)
+    reward = tracker_reward(seen.command, seen.motion, control_dt, seen.action, config.families, config.reward)
     seconds = seen.motion.fell.size * control_dt
     return {"reward": reward.mean(), "falls_per_minute": 60 * seen.motion.fell.sum() / seconds}
 
@@ -178,9 +181,8 @@ def begin_anew(world: World, batch: RobotBatch, who: Bool[np.ndarray, " robot"],
     batch.reset(rng, who)
     world.orders.steps_left[who] = 0
     world.orders.age[who] = 0
-    world.last.restart(batch, who)
 
 
 @eqx.filter_jit
 def _explore(actor: Actor, joints, command: Command, key: PRNGKeyArray, config: TrackerConfig):
-    return actor.sample(tracker_observation(joints, command, config.reach), key)[0]
+    return actor.sample(tracker_observation(joints, command, config.families), key)[0]

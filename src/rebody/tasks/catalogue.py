@@ -1,0 +1,7 @@
+"""Families that come with the package, whose names are taken."""
+
+from rebody.tasks.family_set import FamilySet
+from rebody.tasks.line import LINE
+
+SHIPPED = FamilySet((*LINE,))
+"""What a name means where no module and no file says otherwise."""
