@@ -13,10 +13,12 @@ from rebody import inputs
 from rebody.agents.doubts import RECENT_S, RewardWatch
 from rebody.bodies.robot import wrap_angle
 from rebody.errors import RebodyError
-from rebody.inference import Encoder, EncoderCarry
+from rebody.inference import Encoder
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import MixturePrior
 from rebody.inference.probe import Probe
+from rebody.inference.reader import PlaceReader
+from rebody.inference.sharpened import Sharpened
 from rebody.jax_settings import own_jax_settings
 from rebody.types import ANGLES, DECISION_DT, GLOBAL_FIELDS, RATE_OF, Belief, GlobalState, Transition
 
@@ -50,18 +52,19 @@ class LiveBelief:
 
     def __init__(
         self,
-        encoder: Encoder,
-        probe: Probe,
+        inferrer: Encoder | Sharpened,
+        reader: Probe | PlaceReader,
         mixture: MixturePrior | None,
         contract: Contract,
         state: Any,
     ):
-        self._encoder, self._probe, self._mixture = encoder, probe, mixture
+        self._inferrer, self._reader, self._mixture = inferrer, reader, mixture
         self.believed = 0
         """Decisions in which a reward was heard and believed."""
         self._decision, self._watch = 0, RewardWatch(contract)
-        self._memory, self._previous = encoder.initial(), _global_state(encoder.fields, state, None, "at the start")
-        self._reading = self._read(encoder.prior())
+        self._fields = contract.fields
+        self._memory, self._previous = inferrer.initial(), _global_state(self._fields, state, None, "at the start")
+        self._reading = self._read(inferrer.prior())
 
     @property
     def reading(self) -> Reading:
@@ -79,13 +82,13 @@ class LiveBelief:
         """
         where = f"decision {self._decision + 1}"
         heard = inputs.reward(reward, where)
-        now = _global_state(self._encoder.fields, state, self._previous, where)
+        now = _global_state(self._fields, state, self._previous, where)
         self._decision += 1
         if heard is None:
             self._watch.pass_over()
         elif self._watch.hear(self._previous, now, heard):
             transition = Transition(self._previous, np.asarray(heard, np.float32), now)
-            self._memory, belief = _take_in(self._encoder, self._memory, transition)
+            self._memory, belief = _take_in(self._inferrer, self._memory, transition)
             self._reading = self._read(belief)
             self.believed += 1
         self._previous = now
@@ -100,9 +103,9 @@ class LiveBelief:
         return self._watch.notes(within_s)
 
     def _read(self, belief: Belief) -> Reading:
-        read = jax.tree.map(np.asarray, _read(self._probe, self._mixture, belief))
+        read = jax.tree.map(np.asarray, _read(self._reader, self._mixture, belief))
         which, target, probabilities, spreads, shares = read
-        families, family = self._probe.families, self._probe.families[which]
+        families, family = self._reader.families, self._reader.families[which]
         clusters = [] if self._mixture is None else np.flatnonzero(self._mixture.active)
         return Reading(
             family=family.name,
@@ -151,12 +154,12 @@ def _wrapped(angle: float) -> float:
 
 
 @eqx.filter_jit
-def _take_in(encoder: Encoder, memory: EncoderCarry, transition: Transition) -> tuple[EncoderCarry, Belief]:
-    return encoder.step(memory, transition)
+def _take_in(inferrer: Encoder | Sharpened, memory: Any, transition: Transition) -> tuple[Any, Belief]:
+    return inferrer.step(memory, transition)
 
 
 @eqx.filter_jit
-def _read(probe: Probe, mixture: MixturePrior | None, belief: Belief) -> tuple[Any, ...]:
+def _read(reader: Probe | PlaceReader, mixture: MixturePrior | None, belief: Belief) -> tuple[Any, ...]:
     """Family, target, probability of each family, mean and deviation of each one's target, of each cluster."""
     shares = jnp.zeros(0) if mixture is None else mixture.shares(belief.mean)
-    return *probe(belief), probe.probabilities(belief), probe.spreads(belief), shares
+    return *reader(belief), reader.probabilities(belief), reader.spreads(belief), shares

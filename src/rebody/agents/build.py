@@ -15,7 +15,7 @@ from rebody.agents.parts import (
     LoadedTracker,
     ScratchParts,
 )
-from rebody.agents.slots import OneSlot, SlotChooser, SlotOfCluster
+from rebody.agents.slots import OneSlot, SlotChooser, SlotOfBelief, SlotOfCluster
 from rebody.bodies import RobotSpec
 from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import is_predictable
@@ -26,8 +26,9 @@ from rebody.types import Task
 
 HORIZON = 15
 """Decisions that `reuse` looks ahead; 1 is the thesis."""
-SlotsBy = Literal["classifier", "clusters"]
-"""How `reuse` chooses a tracker's slot: by a classifier on the latent, or by the mixture's components."""
+SlotsBy = Literal["belief", "classifier", "clusters"]
+"""How `reuse` chooses a tracker's slot: the family that the belief itself says is meant, a classifier on the latent
+that learned with labels (thesis 6.4), or the mixture's components."""
 
 
 def check_agent(kind: str) -> None:
@@ -81,10 +82,16 @@ def check_step_predictor(part: LoadedStepPredictor, tracker: LoadedTracker, infe
 
 
 def slot_chooser(inference: Inference, loaded: LoadedSlots | None, by: SlotsBy) -> SlotChooser:
-    """What chooses the slot of subgoals; a module of one family needs no classifier artifact.
+    """What chooses the slot of subgoals; a module of one family has nothing to choose.
 
-    RebodyError if the artifact is missing, was made for another module, or the module has no mixture to go by.
+    RebodyError if an artifact is missing, was made for another module, or the module has no experts or no mixture to
+    go by.
     """
+    decoder = inference.parts.module.decoder
+    if by == "belief" and len(inference.contract.families) > 1:
+        if decoder.choice is None:
+            raise RebodyError(f"the beliefs of '{inference.name}' do not say which family is meant: use a classifier.")
+        return SlotOfBelief(decoder)
     if loaded is None:
         if len(inference.contract.families) != 1:
             raise RebodyError(
@@ -112,13 +119,18 @@ def build_agent(
     scratch: ScratchParts | None = None,
     stride: int = 1,
     horizon: int = HORIZON,
+    sharpen: bool = False,
 ) -> Agent:
     """An agent of a named kind; `oracle` needs the tasks, the active ones [time, episode], `retrain` its policy,
     `scratch` its own module, and `reuse` on a robot what chooses its slots (a point mass has none: the module's first
-    family stands for all). `families` are those in play, the module's first, which is all by default.
+    family stands for all). `families` are those in play, the module's first, which is all by default. `sharpen` has
+    `reuse` and `readout` sharpen their beliefs, where the module can; policies that learned on a robot have the beliefs
+    that they learned with.
 
     RebodyError if there is no such kind, or the module cannot serve it.
     """
     check_agent(kind)
     in_play = families or inference.contract.families
-    return KINDS[kind].build(Ingredients(inference, in_play, tasks, slots, high_level, scratch, stride, horizon))
+    return KINDS[kind].build(
+        Ingredients(inference, in_play, tasks, slots, high_level, scratch, stride, horizon, sharpen)
+    )

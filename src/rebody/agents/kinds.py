@@ -29,12 +29,21 @@ class Ingredients:
     scratch: ScratchParts | None
     stride: int
     horizon: int
+    sharpen: bool
 
     @property
     def listening(self) -> dict[str, Any]:
         """Of an agent whose belief is the frozen module's."""
-        parts = self.inference.parts
-        return {"inferrer": parts.module.encoder, "reader": parts.probe, **self.speaking}
+        return self._believing(sharpen=False)
+
+    @property
+    def believing_sharply(self) -> dict[str, Any]:
+        """Of one whose belief is sharpened, where that is wanted."""
+        return self._believing(self.sharpen)
+
+    def _believing(self, sharpen: bool) -> dict[str, Any]:
+        inferrer, reader = self.inference.believing(sharpen)
+        return {"inferrer": inferrer, "reader": reader, **self.speaking}
 
     @property
     def speaking(self) -> dict[str, Any]:
@@ -54,6 +63,8 @@ class Kind:
     build: Callable[[Ingredients], Agent]
     in_thesis_mode: bool = False
     """Whether its module may tick once per stride (6.3.3)."""
+    sharpens: bool = False
+    """Whether its beliefs may be sharpened; policies that learned on a robot have those that they learned with."""
     on_robots_alone: bool = False
     """Whether its policy learned on a robot, so that a point mass cannot have it."""
 
@@ -61,7 +72,7 @@ class Kind:
 def _reuse(of: Ingredients) -> Agent:
     parts = of.inference.parts
     return ReuseAgent(
-        **of.listening,
+        **of.believing_sharply,
         interpret=parts.module.decoder.interpret,
         high_level=parts.high_level,
         toy=of.inference.toy,
@@ -76,7 +87,7 @@ def _retrain(of: Ingredients) -> Agent:
 
 
 def _readout(of: Ingredients) -> Agent:
-    return ReadoutAgent(**of.listening, **of.told)
+    return ReadoutAgent(**of.believing_sharply, **of.told)
 
 
 def _bayes(of: Ingredients) -> Agent:
@@ -104,9 +115,9 @@ def _idle(of: Ingredients) -> Agent:
 
 
 KINDS = {
-    "reuse": Kind(_reuse, in_thesis_mode=True),
+    "reuse": Kind(_reuse, in_thesis_mode=True, sharpens=True),
     "retrain": Kind(_retrain, in_thesis_mode=True, on_robots_alone=True),
-    "readout": Kind(_readout, in_thesis_mode=True),
+    "readout": Kind(_readout, in_thesis_mode=True, sharpens=True),
     "bayes": Kind(_bayes, in_thesis_mode=True),
     "oracle": Kind(_oracle),
     "flat": Kind(_flat, on_robots_alone=True),

@@ -54,6 +54,7 @@ class LiveAgent:
         slots: LoadedSlots | None = None,
         horizon: int = HORIZON,
         on_bad_input: str = "error",
+        sharpen: bool = True,
     ):
         """RebodyError if the module or the tracker does not fit the robot, or `on_bad_input` is none of the two."""
         if on_bad_input not in ON_BAD_INPUT:
@@ -64,8 +65,10 @@ class LiveAgent:
         # the tracker's own, too: a command to stand still need not be one that the module knows
         self._families = inference.contract.families.beside(tracker.tracker.families)
         self._controller = TrackerController(tracker.tracker, self._families, spec.goal_ahead)
-        chooser = slot_chooser(inference, slots, "classifier")
-        self._agent = build_agent("reuse", inference, families=self._families, slots=chooser, horizon=horizon)
+        chooser = slot_chooser(inference, slots, "belief" if slots is None and inference.can_sharpen else "classifier")
+        self._agent = build_agent(
+            "reuse", inference, families=self._families, slots=chooser, horizon=horizon, sharpen=sharpen
+        )
         self.reset()
 
     def reset(self) -> None:
@@ -104,8 +107,8 @@ class LiveAgent:
     @property
     @own_jax_settings()
     def inferred(self) -> tuple[str, tuple[float, ...]]:
-        """Family and target [m, m/s, rad] that a linear probe reads from the belief; the agent does not use it."""
-        which, target = self._inference.parts.probe(self._heard.belief)
+        """Family and target [m, m/s, rad] that are read from the belief; the agent does not use it."""
+        which, target = self._agent.reader(self._heard.belief)
         family = self._inference.contract.families[which]
         return family.name, tuple(np.asarray(target)[: family.size].tolist())
 
@@ -188,15 +191,18 @@ def load_agent(
     classifier: str | None = None,
     horizon: int = HORIZON,
     on_bad_input: str = "error",
+    sharpen: bool = True,
 ) -> LiveAgent:
     """An agent of shipped or own artifacts, ready to `step`; RebodyError if they do not fit together.
 
-    `robot` is a name or the path of a TOML file; tracker and classifier default to `tracker-ROBOT` and
-    `classifier-INFERENCE`, which a module of one family does not need. With `on_bad_input="hold"` a sensor that drops
+    `robot` is a name or the path of a TOML file; the tracker defaults to `tracker-ROBOT`. Slots are chosen by the
+    belief itself, or by a `classifier` where one is given; without `sharpen` the encoder's belief stays as it is, and
+    the classifier defaults to `classifier-INFERENCE` (the thesis' way). With `on_bad_input="hold"` a sensor that drops
     out raises nothing: numbers that cannot be are replaced by the last good ones, the last command is kept for at most
     0.3 s, and then the robot is told to stand still until the input is good again; `status` says so.
     """
     spec, module = load_robot(robot), load_inference(inference)
-    slots = load_slots_of(module, classifier)
+    by_belief = classifier is None and sharpen and module.can_sharpen
+    slots = None if by_belief else load_slots_of(module, classifier)
     tracked = load_tracker(f"tracker-{spec.name}" if tracker is None else tracker)
-    return LiveAgent(spec, module, tracked, slots, horizon, on_bad_input)
+    return LiveAgent(spec, module, tracked, slots, horizon, on_bad_input, sharpen)

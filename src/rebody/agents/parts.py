@@ -31,10 +31,12 @@ from rebody.control.slot_policy import SlotPolicy
 from rebody.control.step_predictor import StepPredictor
 from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
-from rebody.inference import InferenceConfig, InferenceModule
+from rebody.inference import Encoder, InferenceConfig, InferenceModule
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import MixturePrior, no_mixture
 from rebody.inference.probe import Probe, unfitted
+from rebody.inference.reader import PlaceReader
+from rebody.inference.sharpened import Sharpened, can_sharpen
 from rebody.jax_settings import own_jax_settings
 from rebody.nn import MLP
 from rebody.store import arrays_into_tree, load_artifact
@@ -67,16 +69,30 @@ class Inference:
         """How a task is put to the policy that is told it."""
         return TaskCode(places_of(self.contract.families))
 
+    @property
+    def can_sharpen(self) -> bool:
+        """Whether its beliefs can be sharpened; they stay as they are where no expert says a family's place."""
+        module = self.parts.module
+        return can_sharpen(module.encoder, module.decoder, self.contract.families)
+
+    def believing(self, sharpen: bool) -> tuple[Encoder | Sharpened, Probe | PlaceReader]:
+        """What believes, and what reads its beliefs: sharpened where that is wanted and can be, else the encoder."""
+        module = self.parts.module
+        if not (sharpen and self.can_sharpen):
+            return module.encoder, self.parts.probe
+        return Sharpened(module.encoder, module.decoder), PlaceReader(module.decoder, self.contract.families)
+
     @own_jax_settings()
-    def begin(self, state: Any) -> LiveBelief:
+    def begin(self, state: Any, sharpen: bool = True) -> LiveBelief:
         """The belief about a task that begins in this state: its `update` takes in every decision of 0.1 s.
 
         `state` is a mapping with the fields of the contract (m, rad, m/s, rad/s) as `LiveBelief.update` has them.
+        Without `sharpen` the encoder's belief stays as it is (the thesis' way).
         RebodyError if the module hears of a body at other times, or a field is missing.
         """
         self.contract.check_time()
-        parts = self.parts
-        return LiveBelief(parts.module.encoder, parts.probe, parts.mixture, self.contract, state)
+        inferrer, reader = self.believing(sharpen)
+        return LiveBelief(inferrer, reader, self.parts.mixture, self.contract, state)
 
 
 @dataclass(frozen=True)

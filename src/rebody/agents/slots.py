@@ -6,9 +6,13 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float, Int
 
+from rebody.inference.decoder import Decoder
 from rebody.inference.mixture.padded import MixturePrior
 from rebody.nn import MLP
 from rebody.types import AnyArray, Belief
+
+LIKELY = 0.75
+"""Probability from which a family is acted on."""
 
 
 class SlotChooser(eqx.Module):
@@ -41,6 +45,17 @@ class SlotClassifier(SlotChooser):
     def __call__(self, belief: Belief) -> Int[AnyArray, "*batch"]:
         """The likeliest."""
         return jnp.argmax(self.logits(belief), axis=-1)
+
+
+class SlotOfBelief(SlotChooser):
+    """That of the family that the belief itself says is meant; no label is used."""
+
+    decoder: Decoder
+
+    def __call__(self, belief: Belief) -> Int[AnyArray, "*batch"]:
+        """The likeliest, or the first where none is likely enough to act on: before anything is heard."""
+        share = self.decoder.interpret(belief).mean[..., : len(self.decoder.experts)]
+        return jnp.where(jnp.max(share, axis=-1) < LIKELY, 0, jnp.argmax(share, axis=-1))
 
 
 class SlotOfCluster(SlotChooser):

@@ -46,8 +46,12 @@ class TrialOptions:
     """Policy of agent `retrain`; default high-level-INFERENCE-ROBOT."""
     classifier: str | None = None
     """What chooses the slots of `reuse`; default classifier-INFERENCE where a module knows several families."""
-    slots_by: SlotsBy = "classifier"
-    """Choose them by the classifier, or by the mixture's clusters."""
+    slots_by: SlotsBy | None = None
+    """Choose them by the belief itself, by the classifier, or by the mixture's clusters; default is the belief where it
+    is sharpened, else the classifier."""
+    no_sharpen: bool = False
+    """Leave beliefs as the encoder has them (the thesis' way); else `reuse` and `readout` sharpen them, in our mode and
+    where the module has an expert for each family."""
     seconds: Seconds = 20.0
     """Length of an episode."""
     stride: Count | Literal["predicted"] = 1
@@ -75,7 +79,8 @@ class TrialOptions:
             robot=robot,
             inference=inference,
             families=families,
-            slots_by=self.slots_by,
+            slots_by=self._slots_by(inference),
+            sharpen=not self.no_sharpen,
             seconds=self.seconds,
             stride=self._fixed_stride(),
             horizon=self.horizon or (1 if self.thesis else HORIZON),
@@ -95,10 +100,17 @@ class TrialOptions:
             case "retrain":
                 parts["high_level"] = load_high_level(_named(self.high_level, f"high-level-{module}-{robot}"))
             case "reuse":
-                parts["slots"] = load_slots_of(inference, self.classifier)
+                by_belief = self.classifier is None and self._slots_by(inference) == "belief"
+                parts["slots"] = None if by_belief else load_slots_of(inference, self.classifier)
         if self.stride == "predicted":
             parts["step_predictor"] = load_step_predictor(_named(self.step_predictor, f"step-predictor-{robot}"))
         return parts
+
+    def _slots_by(self, inference: Inference) -> SlotsBy:
+        if self.slots_by is not None:
+            return self.slots_by
+        sharpens = not (self.no_sharpen or self.thesis) and inference.can_sharpen
+        return "belief" if sharpens and self.classifier is None else "classifier"
 
     def _fixed_stride(self) -> int:
         """The number, 1 where there is none; RebodyError where nothing can be predicted."""

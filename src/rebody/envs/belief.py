@@ -40,13 +40,15 @@ class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
         control_dt: float,
         observe: Observe = _info,
         task_reward: TaskReward = _reward,
+        sharpen: bool = True,
     ):
         """`control_dt` is what a step of the environment lasts [s]; `inference` a shipped name or a folder.
 
-        As they are, `observe` and `task_reward` serve the environments of this package. RebodyError where steps do not
-        divide a decision, or observations are no vector.
+        Without `sharpen` beliefs stay as the encoder has them. As they are, `observe` and `task_reward` serve the
+        environments of this package. RebodyError where steps do not divide a decision, or observations are no vector.
         """
         made_of = {"inference": inference, "control_dt": control_dt, "observe": observe, "task_reward": task_reward}
+        made_of |= {"sharpen": sharpen}
         gymnasium.utils.RecordConstructorArgs.__init__(self, **made_of)
         gymnasium.Wrapper.__init__(self, env)
         if not inputs.number(control_dt, "control_dt") > 0:
@@ -56,7 +58,7 @@ class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
             raise RebodyError(f"steps of {control_dt:g} s do not divide a decision of {DECISION_DT} s.")
         if not isinstance(env.observation_space, spaces.Box) or len(env.observation_space.shape) != 1:
             raise RebodyError(f"observations must be a vector, not {env.observation_space}; flatten them first.")
-        self._inference = load_inference(inference)
+        self._inference, self._sharpen = load_inference(inference), sharpen
         self._observe, self._task_reward = observe, task_reward
         self._belief: LiveBelief | None = None
         self._rewards: list[float | None] = []
@@ -82,7 +84,7 @@ class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
         """Start anew and forget; RebodyError where `observe` does not give what the module sees."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._belief, self._rewards = None, []
-        self._belief = self._inference.begin(self._observe(observation, info))
+        self._belief = self._inference.begin(self._observe(observation, info), self._sharpen)
         return self._beside(observation), info
 
     def step(self, action: Any):

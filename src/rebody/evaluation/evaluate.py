@@ -78,6 +78,7 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int, yardsticks: Yardst
         horizon=trial.horizon,
         thesis=trial.thesis,
         frozen=frozen,
+        sharpened=trial.sharpens,
         family_set=trial.in_play,
         episodes=episode_results(
             trial.in_play, specs, episode_seeds, tasks, episodes, read, clusters, yardsticks.returns
@@ -150,6 +151,7 @@ def trial_agent(trial: Trial, tasks: Task) -> Agent:
         scratch=trial.scratch.parts if trial.scratch else None,
         stride=stride,
         horizon=trial.horizon,
+        sharpen=trial.sharpens,
     )
 
 

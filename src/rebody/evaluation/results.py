@@ -35,6 +35,8 @@ class Results:
     thesis: bool
     frozen: dict[str, str]
     """SHA-256 of the inference module and of the toy's policy, the same before the episodes and after them."""
+    sharpened: bool
+    """Whether the agent's beliefs were sharpened."""
     family_set: FamilySet
     """The families in play: the module's, then others that were asked for."""
     episodes: list[EpisodeResult]

@@ -55,6 +55,8 @@ class Trial:
     slots: LoadedSlots | None = None
     """What chooses the slots of `reuse` on a robot, for a module of several families."""
     slots_by: SlotsBy = "classifier"
+    sharpen: bool = False
+    """Whether beliefs are sharpened, where agent and module can: `reuse` and `readout`, not in thesis mode."""
     toy: Toy | None = None
     """A point mass other than the one that the module learned on."""
     seconds: float = 20.0
@@ -88,6 +90,11 @@ class Trial:
         """The module's families, the tracker's, then all others whose names are known."""
         own = self.contract.families
         return (own.beside(self.tracker.tracker.families) if self.tracker else own).beside(self.families)
+
+    @property
+    def sharpens(self) -> bool:
+        """Whether the agent's beliefs are sharpened."""
+        return self.sharpen and not self.thesis and KINDS[self.agent].sharpens and self.inference.can_sharpen
 
     @property
     def decisions(self) -> int:

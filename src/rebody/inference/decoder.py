@@ -162,8 +162,8 @@ class Decoder(eqx.Module):
     ) -> Prediction:
         """The reward's prediction, in units of the reward scale; one expert where z is not split."""
         kind, amount = latent[..., : self.kinds], latent[..., self.kinds :]
-        own = zip(self.experts, self._amounts(amount), strict=True)
-        mean = jnp.stack([expert(self._read(expert, next_state), amounts) for expert, amounts in own], axis=-1)
+        own = zip(self.experts, self.amounts(amount), strict=True)
+        mean = jnp.stack([expert(self.read(expert, next_state), amounts) for expert, amounts in own], axis=-1)
         log_share = jax.nn.log_softmax(self.choice(kind), axis=-1) if self.choice else jnp.zeros_like(mean)
         inputs = jnp.concatenate([seen(next_state, self.fields, self.scales), latent], axis=-1)
         return Prediction(mean, log_share, jnp.clip(self.log_variance(inputs)[..., 0], -12.0, 4.0))
@@ -180,7 +180,7 @@ class Decoder(eqx.Module):
         # what a softmax of a Gaussian is on average (MacKay 1992)
         spread = jnp.einsum("...k,kf->...f", kind.variance, self.choice.weights[0] ** 2)
         share = jax.nn.softmax(self.choice(kind.mean) / jnp.sqrt(1 + jnp.pi / 8 * spread), axis=-1)
-        of_each = zip(self.experts, self._amounts(amount.mean), self._amounts(amount.variance), strict=True)
+        of_each = zip(self.experts, self.amounts(amount.mean), self.amounts(amount.variance), strict=True)
         doubt = [expert.doubt(Belief(mean, variance)) for expert, mean, variance in of_each]
         return Belief(
             jnp.concatenate([share, self.places(amount.mean)], axis=-1),
@@ -189,13 +189,13 @@ class Decoder(eqx.Module):
 
     def places(self, amount: Float[AnyArray, "*batch amount"]) -> Float[AnyArray, "*batch number"]:
         """Where each family's quantity would be brought, scaled as the encoder's fields."""
-        own = zip(self.experts, self._amounts(amount), strict=True)
+        own = zip(self.experts, self.amounts(amount), strict=True)
         return jnp.concatenate([expert.place(amounts) for expert, amounts in own], axis=-1)
 
-    def _amounts(self, amounts: Float[AnyArray, "*batch amount"]) -> Sequence[Float[AnyArray, "*batch own"]]:
+    def amounts(self, amounts: Float[AnyArray, "*batch amount"]) -> Sequence[Float[AnyArray, "*batch own"]]:
         """What each expert goes by."""
         return jnp.split(amounts, len(self.experts), axis=-1)
 
-    def _read(self, expert: Expert, state: Float[AnyArray, "*batch field"]) -> Float[AnyArray, "*batch own"]:
+    def read(self, expert: Expert, state: Float[AnyArray, "*batch field"]) -> Float[AnyArray, "*batch own"]:
         """The fields that an expert is about."""
         return state[..., np.array([self.fields.index(field) for field in expert.fields])]

@@ -64,7 +64,7 @@ class Session:
         self.body.reset(np.random.default_rng(seed))
         self._now = self._before = self._seen()
         self._drive = Drive(self._agent, self._controller, self.body, self.trial.in_play)
-        self._listener = self.trial.inference.begin(_fields(self.body.observe(), self.trial))
+        self._listener = self.trial.inference.begin(_fields(self.body.observe(), self.trial), self.trial.sharpens)
         self.moments.clear()
 
     def step(self) -> None:

@@ -79,10 +79,13 @@ class BeliefOverTime:
         return float(self.time_s[broken[-1] + 1 if broken.size else 0])
 
 
-def believe(inference: Inference, decisions: Decisions) -> BeliefOverTime:
-    """Let a module hear a run, decision by decision; where there is no reward, nothing was heard."""
+def believe(inference: Inference, decisions: Decisions, sharpen: bool = True) -> BeliefOverTime:
+    """Let a module hear a run, decision by decision; where there is no reward, nothing was heard.
+
+    Without `sharpen` its beliefs stay as the encoder has them.
+    """
     states = [dict(zip(decisions.fields, at, strict=True)) for at in zip(*decisions.fields.values(), strict=True)]
-    belief = inference.begin(states[0])
+    belief = inference.begin(states[0], sharpen)
     rewards = [None if math.isnan(reward) else float(reward) for reward in decisions.reward]
     readings = [belief.update(*heard) for heard in zip(states[1:], rewards, strict=True)]
     doubts, notes = belief.doubts(math.inf), belief.notes(math.inf)

@@ -1,0 +1,96 @@
+"""Damped Gauss-Newton steps on what a reward expert leaves unexplained (docs/sharp-beliefs.md).
+
+The expert is a likelihood with a handful of parameters, its amounts; all here is about one expert and one body.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Bool, Float
+
+from rebody.inference.decoder import Expert
+from rebody.types import AnyArray
+
+STEPS = 6
+"""Of each refinement: a guess that is near has arrived by then."""
+FLOOR, RELATIVE = 2e-3, 0.01
+"""Standard deviation of the decoder's error: so much of the reward scale, and such a share of the reward, since what
+is not learned exactly is the weight of a distance."""
+RIDGE = 1e-6
+FIRST_DAMPING, LESS, MORE = 1e-2, 0.2, 8.0
+"""Of Levenberg and Marquardt: at the start, after a step that helped, and after one that did not."""
+
+
+class Heard(eqx.Module):
+    """What one expert is to explain: rewards and the states that they were paid in, in the encoder's units."""
+
+    expert: Expert
+    states: Float[AnyArray, "window own"]
+    rewards: Float[AnyArray, " window"]
+    is_heard: Bool[AnyArray, " window"]
+    """False for what belongs to another task, or was before the episode began."""
+
+
+class Known(NamedTuple):
+    """What is known of the amounts beside that: a Gaussian around `centre`, and a weak one around `guess`."""
+
+    centre: Float[AnyArray, " amount"]
+    information: Float[AnyArray, "amount amount"]
+    """Inverse covariance."""
+    guess: Float[AnyArray, " amount"]
+    precision: Float[AnyArray, " amount"]
+    """One over the standard deviation."""
+
+
+class Refined(NamedTuple):
+    """Where a refinement ended."""
+
+    amount: Float[AnyArray, "*batch amount"]
+    cost: Float[AnyArray, "*batch"]
+    """Negative log-likelihood there, but for a constant [nats]."""
+    information: Float[AnyArray, "*batch amount amount"]
+    """Inverse covariance there."""
+
+
+def surprise(
+    expert: Expert,
+    state: Float[AnyArray, "*batch own"],
+    reward: Float[AnyArray, "*batch"],
+    amount: Float[AnyArray, "*batch amount"],
+) -> Float[AnyArray, "*batch"]:
+    """Distance of rewards from what is expected, in standard deviations of the decoder's error."""
+    return (reward - expert(state, amount)) / (FLOOR + RELATIVE * jnp.abs(reward))
+
+
+def refine(heard: Heard, start: Float[AnyArray, " amount"], known: Known) -> Refined:
+    """Levenberg-Marquardt from a start, a fixed number of steps; it never ends anywhere worse."""
+    size = start.shape[-1]
+    # float32 loses the small directions of a matrix that has gathered much in another one
+    ridge = (1e-4 * jnp.trace(known.information) + 1e-4) * jnp.eye(size)
+    root = jnp.linalg.cholesky(known.information + ridge).T
+
+    def unexplained(amount):
+        alike = jnp.broadcast_to(amount, (*heard.rewards.shape, size))
+        window = jnp.where(heard.is_heard, surprise(heard.expert, heard.states, heard.rewards, alike), 0.0)
+        return jnp.concatenate([window, root @ (amount - known.centre), known.precision * (amount - known.guess)])
+
+    def cost_of(amount):
+        return 0.5 * jnp.sum(unexplained(amount) ** 2)
+
+    def step(walk, _):
+        amount, cost, damping = walk
+        error, slope = unexplained(amount), jax.jacfwd(unexplained)(amount)
+        information = slope.T @ slope
+        damped = information + damping * jnp.diag(jnp.diag(information)) + RIDGE * jnp.eye(size)
+        new = amount - jnp.linalg.solve(damped, slope.T @ error)
+        new_cost = cost_of(new)
+        helped = new_cost < cost
+        ended = jnp.where(helped, new, amount), jnp.where(helped, new_cost, cost)
+        return (*ended, damping * jnp.where(helped, LESS, MORE)), None
+
+    begun = (start, cost_of(start), jnp.asarray(FIRST_DAMPING))
+    (amount, cost, _), _ = jax.lax.scan(step, begun, length=STEPS)
+    slope = jax.jacfwd(unexplained)(amount)
+    return Refined(amount, cost, slope.T @ slope)

@@ -1,0 +1,153 @@
+"""Sharp beliefs: the encoder proposes, a few Gauss-Newton steps on the decoder's likelihood refine.
+
+What the encoder says at once (amortised inference, thesis 5.3.3) is where the maximisation of the likelihood begins
+(semi-amortised: Kim et al. 2018; Marino et al. 2018). The module stays frozen. docs/sharp-beliefs.md has the
+mathematics.
+"""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from rebody.inference.decoder import Decoder
+from rebody.inference.encoder import Encoder, EncoderCarry
+from rebody.inference.hypotheses import Hypotheses, explain, no_hypotheses
+from rebody.inference.inputs import scaled
+from rebody.inference.refine import Heard, surprise
+from rebody.tasks import FamilySet
+from rebody.types import AnyArray, Belief, Transition
+
+SURPRISED, MORE_THAN_GUESS = 6.0, 1.5
+"""The task has changed where a reward lies so many standard deviations from what any hypothesis expects, and so many
+times as far as from what the encoder's guess does."""
+NEW = 10.0
+"""What a new hypothesis pays for the past that others have explained [nats]."""
+UNLIKELIEST = -7.0
+"""Log-probability that the encoder leaves every family at least: it is often too sure."""
+FIRST_SHARP = 2
+"""Rewards that a sharp belief needs; one alone is explained by any family, and the encoder knows what is likely."""
+
+
+class Memory(eqx.Module):
+    """What is carried from decision to decision."""
+
+    carry: EncoderCarry
+    states: Float[AnyArray, "*batch window field"]
+    rewards: Float[AnyArray, "*batch window"]
+    heard: Int[AnyArray, "*batch"]
+    """Transitions since the task is what it is."""
+    experts: tuple[Hypotheses, ...]
+
+
+class Sharpened(eqx.Module):
+    """An encoder whose beliefs are refined; it stands where an encoder stands, and its memory is larger.
+
+    The latent says what it said: the likeliest hypothesis' amounts of each expert, and which family is meant.
+    """
+
+    encoder: Encoder
+    decoder: Decoder
+
+    def initial(self, shape: tuple[int, ...] = ()) -> Memory:
+        """Nothing heard yet."""
+        encoder, window = self.encoder, self._window
+        amounts = (encoder.latent - encoder.kinds) // len(self.decoder.experts)
+        return Memory(
+            encoder.initial(shape),
+            jnp.zeros((*shape, window, len(encoder.fields))),
+            jnp.zeros((*shape, window)),
+            jnp.zeros(shape, jnp.int32),
+            (no_hypotheses(shape, amounts),) * len(self.decoder.experts),
+        )
+
+    def prior(self, shape: tuple[int, ...] = ()) -> Belief:
+        """The belief before the first transition: the encoder's."""
+        return self.encoder.prior(shape)
+
+    def step(self, memory: Memory, transition: Transition) -> tuple[Memory, Belief]:
+        """One decision: take in a transition, say what is believed now."""
+        encoder = self.encoder
+        carry, guess = encoder.step(memory.carry, transition)
+        state = scaled(transition.state, encoder.fields, encoder.scales)
+        one = self._of_one_body
+        for _ in guess.mean.shape[:-1]:
+            one = jax.vmap(one)
+        own = (memory.states, memory.rewards, memory.heard, memory.experts)
+        own, belief = one(own, guess, state, jnp.asarray(transition.reward) / encoder.reward_scale)
+        return Memory(carry, *own), belief
+
+    @property
+    def _window(self) -> int:
+        assert self.encoder.window is not None  # `can_sharpen`
+        return self.encoder.window
+
+    def _of_one_body(self, own, guess: Belief, state: Float[AnyArray, " field"], reward: Float[AnyArray, ""]):
+        """Window, rewards, how many and hypotheses after one more transition, and the belief."""
+        states, rewards, heard, hypotheses = own
+        decoder, window = self.decoder, self._window
+        log_share, guesses = self._proposed(guess)
+        changed = (heard > 0) & self._is_surprised(hypotheses, log_share, guesses, state, reward)
+        heard = jnp.where(changed, 0, heard)
+        # what leaves the window stays as information: a body that stands still hears nothing new
+        hypotheses = [
+            each.forgetting(changed).remembering(expert, decoder.read(expert, states[0]), rewards[0], heard >= window)
+            for expert, each in zip(decoder.experts, hypotheses, strict=True)
+        ]
+        states = jnp.concatenate([states[1:], state[None]])
+        rewards = jnp.concatenate([rewards[1:], reward[None]])
+        heard = heard + 1
+        is_heard = jnp.arange(window) >= window - heard
+        least = jnp.min(jnp.stack([each.past for each in hypotheses]))
+        fresh = jnp.where(jnp.isfinite(least), least + jnp.where(heard > window, NEW, 0.0), 0.0)
+        hypotheses = tuple(
+            explain(Heard(expert, decoder.read(expert, states), rewards, is_heard), each, own_guess, fresh, heard)
+            for expert, each, own_guess in zip(decoder.experts, hypotheses, guesses, strict=True)
+        )
+        sharp = self._belief(guess, log_share, hypotheses)
+        belief = jax.tree.map(lambda first, then: jnp.where(heard < FIRST_SHARP, first, then), guess, sharp)
+        return (states, rewards, heard, hypotheses), belief
+
+    def _proposed(self, guess: Belief) -> tuple[Float[Array, " expert"], list[Belief]]:
+        """What the encoder says: log-probability of each expert, and its amounts."""
+        decoder, kinds = self.decoder, self.decoder.kinds
+        log_share = jax.nn.log_softmax(decoder.choice(guess.mean[:kinds])) if decoder.choice else jnp.zeros(1)
+        means, variances = (decoder.amounts(numbers[kinds:]) for numbers in (guess.mean, guess.variance))
+        return log_share, [Belief(*each) for each in zip(means, variances, strict=True)]
+
+    def _is_surprised(
+        self, hypotheses: Sequence[Hypotheses], log_share, guesses: list[Belief], state, reward
+    ) -> Bool[Array, ""]:
+        """Whether no hypothesis expected this reward, and the encoder's guess did better."""
+        least, of_guess = [], []
+        for expert, each, guess in zip(self.decoder.experts, hypotheses, guesses, strict=True):
+            seen = self.decoder.read(expert, state)
+            far = jnp.abs(jax.vmap(lambda amount, on=expert, at=seen: surprise(on, at, reward, amount))(each.amounts))
+            least.append(jnp.min(jnp.where(jnp.isfinite(each.past), far, jnp.inf)))
+            of_guess.append(jnp.abs(surprise(expert, seen, reward, guess.mean)))
+        nearest = jnp.min(jnp.stack(least))
+        return (nearest > SURPRISED) & (nearest > MORE_THAN_GUESS * jnp.stack(of_guess)[jnp.argmax(log_share)])
+
+    def _belief(self, guess: Belief, log_share, hypotheses: Sequence[Hypotheses]) -> Belief:
+        """The likeliest hypothesis of each expert; where another family than the encoder's explains more, kinds with
+        the logits of the two exchanged.
+        """
+        kind, choice = guess.mean[: self.decoder.kinds], self.decoder.choice
+        if choice is not None:
+            evidence = jnp.maximum(log_share, UNLIKELIEST) - jnp.stack([each.cost[0] for each in hypotheses])
+            first, best, logits = jnp.argmax(log_share), jnp.argmax(evidence), jnp.asarray(choice(kind))
+            wanted = logits.at[first].set(logits[best]).at[best].set(logits[first])
+            kind = kind + (wanted - logits) @ jnp.linalg.pinv(choice.weights[0])
+        mean = jnp.concatenate([kind, *(each.amounts[0] for each in hypotheses)])
+        return Belief(
+            mean,
+            jnp.concatenate([guess.variance[: self.decoder.kinds], *(each.variance[0] for each in hypotheses)]),
+        )
+
+
+def can_sharpen(encoder: Encoder, decoder: Decoder, families: FamilySet) -> bool:
+    """Whether a module's decoder says which place is meant: an expert for each family, and a window to explain."""
+    is_alone = len(families) == 1 and families[0].quantity.components == encoder.fields
+    return encoder.window is not None and (decoder.choice is not None or is_alone)
