@@ -124,7 +124,7 @@ def test_what_cannot_be_asked_for_is_said(agent_that):
 
 
 def test_what_is_inferred_is_a_family_and_a_vector(agent_that):
-    agent = agent_that()
+    agent = agent_that(sharpen=False)
     agent.step(good(0), None)
     assert agent.inferred == ("goal", (pytest.approx(0.5),))  # what the tiny probe says of the prior
 

@@ -259,7 +259,7 @@ def test_bayes_finds_goals_on_the_toy(inference):
 
 @pytest.fixture(scope="module")
 def live(inference, tracker, cheetah):
-    return LiveAgent(cheetah, inference, LoadedTracker("tiny", "cheetah", tracker), horizon=5)
+    return LiveAgent(cheetah, inference, LoadedTracker("tiny", "cheetah", tracker), horizon=5, sharpen=False)
 
 
 def test_an_agent_driven_from_outside_does_the_same(live, cheetah, episodes):

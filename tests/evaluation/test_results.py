@@ -28,7 +28,7 @@ SERIES = {
     "inferred_family", "inferred_target", "cluster", "latent", "subgoal_family", "subgoal",
 }  # fmt: skip
 EPISODE = SERIES | {"family", "target", "seed", "quantities", "fell", "return", "oracle_return", "final_error"}
-BESIDE_HEAD = {"tracker"}
+BESIDE_HEAD = {"tracker", "sharpened"}
 BESIDE_EPISODE = {"final_squared_error", "ripple_m_s", "idle_return"}
 DECISIONS = 40
 GOAL, VELOCITY, STAND = (SHIPPED.index(name) for name in ("goal", "velocity", "stand"))

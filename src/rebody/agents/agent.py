@@ -7,15 +7,19 @@ from typing import Any, Protocol, runtime_checkable
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from rebody.agents.slots import SlotChooser
 from rebody.bodies.toys import Toy
 from rebody.control.high_level import HighLevelPolicy
 from rebody.control.places import TaskCode
 from rebody.control.slot_policy import SlotPolicy
+from rebody.inference.reader import PlaceReader
 from rebody.tasks import FamilySet
 from rebody.types import AnyArray, Belief, GlobalState, Subgoal, Task, Transition
+
+SURE = 0.2
+"""A target is known for sure where its standard deviation is below this share of its family's tolerance."""
 
 
 class Observation(eqx.Module):
@@ -115,14 +119,42 @@ class ReuseAgent(Agent):
 
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """The policy's action for a toy; for a robot, where that policy would lead a toy from here."""
-        action = self.high_level(state, self.interpret(belief))
+        action = self.acting(belief)(state)
         slot = self.slots(belief)
         return Command(action, Subgoal(slot, self.families.achieved_by_way_of(slot, self.imagine(state, belief))))
 
     def imagine(self, state: GlobalState, belief: Belief) -> GlobalState:
         """Where the nominal toy would be after each of `horizon` decisions, [decision, *batch], the belief held."""
+        return self.toy.imagine(state, self.acting(belief), self.horizon)
+
+    def acting(self, belief: Belief) -> Callable[[GlobalState], Float[AnyArray, "*batch action"]]:
+        """What moves the toy while this is believed."""
         understood = self.interpret(belief)
-        return self.toy.imagine(state, lambda seen: self.high_level(seen, understood), self.horizon)
+        return lambda state: self.high_level(state, understood)
+
+
+class SharpReuseAgent(ReuseAgent):
+    """`reuse` of sharpened beliefs: where a target is known for sure, the toy's policy is the one that was told it.
+
+    A policy that learned with an encoder's beliefs is as exact as those were. Both are frozen, and learned on the toy.
+    """
+
+    reader: PlaceReader
+    told_policy: HighLevelPolicy
+    task_code: TaskCode
+
+    def acting(self, belief: Belief) -> Callable[[GlobalState], Float[AnyArray, "*batch action"]]:
+        """By the policy that was told its task where the belief is sure, else by the one that reads beliefs."""
+        by_belief, sure = super().acting(belief), self.is_sure(belief)
+        told = self.task_code(Task(*self.reader(belief)))
+        return lambda state: jnp.where(sure[..., None], self.told_policy(state, told), by_belief(state))
+
+    def is_sure(self, belief: Belief) -> Bool[AnyArray, "*batch"]:
+        """Whether the standard deviation of the likeliest family's target is small beside its tolerance."""
+        which, _ = self.reader(belief)
+        spreads = zip(self.reader.families, self.reader.spreads(belief), strict=True)
+        sure = [jnp.max(deviation, axis=-1) < SURE * family.tolerance for family, (_, deviation) in spreads]
+        return jnp.take_along_axis(jnp.stack(sure, axis=-1), which[..., None], axis=-1)[..., 0]
 
 
 class ToldAgent(Agent):

@@ -6,7 +6,16 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from rebody.agents.agent import Agent, FlatAgent, IdleAgent, OracleAgent, ReadoutAgent, RetrainAgent, ReuseAgent
+from rebody.agents.agent import (
+    Agent,
+    FlatAgent,
+    IdleAgent,
+    OracleAgent,
+    ReadoutAgent,
+    RetrainAgent,
+    ReuseAgent,
+    SharpReuseAgent,
+)
 from rebody.agents.parts import Inference, ScratchParts
 from rebody.agents.slots import OneSlot, SlotChooser
 from rebody.control.slot_policy import SlotPolicy
@@ -71,14 +80,16 @@ class Kind:
 
 def _reuse(of: Ingredients) -> Agent:
     parts = of.inference.parts
-    return ReuseAgent(
-        **of.believing_sharply,
-        interpret=parts.module.decoder.interpret,
-        high_level=parts.high_level,
-        toy=of.inference.toy,
-        slots=of.slots or OneSlot(),  # a point mass has no slots: the first family stands for all
-        horizon=of.horizon,
-    )
+    made_of = of.believing_sharply | {
+        "interpret": parts.module.decoder.interpret,
+        "high_level": parts.high_level,
+        "toy": of.inference.toy,
+        "slots": of.slots or OneSlot(),  # a point mass has no slots: the first family stands for all
+        "horizon": of.horizon,
+    }
+    if of.sharpen and of.inference.can_sharpen:
+        return SharpReuseAgent(**made_of, **of.told)
+    return ReuseAgent(**made_of)
 
 
 def _retrain(of: Ingredients) -> Agent:

@@ -35,11 +35,11 @@ class Results:
     thesis: bool
     frozen: dict[str, str]
     """SHA-256 of the inference module and of the toy's policy, the same before the episodes and after them."""
-    sharpened: bool
-    """Whether the agent's beliefs were sharpened."""
     family_set: FamilySet
     """The families in play: the module's, then others that were asked for."""
     episodes: list[EpisodeResult]
+    sharpened: bool = False
+    """Whether the agent's beliefs were sharpened; files of earlier releases do not say, and there they were not."""
 
     def of(self, family: str) -> list[EpisodeResult]:
         """Episodes whose last task is of that family."""

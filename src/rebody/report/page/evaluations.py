@@ -19,7 +19,18 @@ KIND = "kind of task"
 
 def settings_of(results: Results) -> dict[str, Any]:
     """Who was put to the test, and where."""
-    names = ("robot", "agent", "inference", "tracker", "control_dt", "stride", "horizon", "thesis", "frozen")
+    names = (
+        "robot",
+        "agent",
+        "inference",
+        "tracker",
+        "control_dt",
+        "stride",
+        "horizon",
+        "thesis",
+        "sharpened",
+        "frozen",
+    )
     seconds = max(episode.time_s[-1] for episode in results.episodes)
     seeds = len({episode.seed for episode in results.episodes})
     return {name: getattr(results, name) for name in names} | {
