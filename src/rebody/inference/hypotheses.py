@@ -16,7 +16,7 @@ KEPT = 2
 APART = 3.0
 """Standard deviations between two hypotheses that are not one and the same."""
 HOPELESS = 20.0
-"""A hypothesis that is so much less likely than the best of its expert is given up [nats]."""
+"""A hypothesis that is so much less likely than the best does not count [nats]."""
 STARTS = 8
 """All over the places that an expert may mean, one tried at each decision."""
 GUESS_DEVIATIONS = 100.0

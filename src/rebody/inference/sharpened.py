@@ -14,21 +14,21 @@ from jaxtyping import Array, Bool, Float, Int
 
 from rebody.inference.decoder import Decoder
 from rebody.inference.encoder import Encoder, EncoderCarry
-from rebody.inference.hypotheses import Hypotheses, explain, no_hypotheses
+from rebody.inference.hypotheses import HOPELESS, Hypotheses, explain, no_hypotheses
 from rebody.inference.inputs import scaled
 from rebody.inference.refine import Heard, surprise
 from rebody.tasks import FamilySet
 from rebody.types import AnyArray, Belief, Transition
 
 SURPRISED, MORE_THAN_GUESS = 6.0, 1.5
-"""The task has changed where a reward lies so many standard deviations from what any hypothesis expects, and so many
-times as far as from what the encoder's guess does."""
+"""The task has changed where a reward lies so many standard deviations from what any likely hypothesis expects, and so
+many times as far as from what the encoder's guess does; or where no hypothesis is nearer to the whole window."""
 NEW = 10.0
 """What a new hypothesis pays for the past that others have explained [nats]."""
-UNLIKELIEST = -7.0
+UNLIKELIEST = -4.0
 """Log-probability that the encoder leaves every family at least: it is often too sure."""
-FIRST_SHARP = 2
-"""Rewards that a sharp belief needs; one alone is explained by any family, and the encoder knows what is likely."""
+FIRST_SHARP = 3
+"""Rewards that a sharp belief needs: fewer are explained by any family, and the encoder knows what is likely."""
 
 
 class Memory(eqx.Module):
@@ -89,7 +89,8 @@ class Sharpened(eqx.Module):
         states, rewards, heard, hypotheses = own
         decoder, window = self.decoder, self._window
         log_share, guesses = self._proposed(guess)
-        changed = (heard > 0) & self._is_surprised(hypotheses, log_share, guesses, state, reward)
+        changed = self._is_surprised(hypotheses, log_share, guesses, state, reward) | self._explains_nothing(own)
+        changed = changed & (heard > 0)
         heard = jnp.where(changed, 0, heard)
         # what leaves the window stays as information: a body that stands still hears nothing new
         hypotheses = [
@@ -120,15 +121,22 @@ class Sharpened(eqx.Module):
     def _is_surprised(
         self, hypotheses: Sequence[Hypotheses], log_share, guesses: list[Belief], state, reward
     ) -> Bool[Array, ""]:
-        """Whether no hypothesis expected this reward, and the encoder's guess did better."""
-        least, of_guess = [], []
+        """Whether no likely hypothesis expected this reward, and the encoder's guess did better."""
+        least, of_guess, best = [], [], _least(hypotheses)
         for expert, each, guess in zip(self.decoder.experts, hypotheses, guesses, strict=True):
             seen = self.decoder.read(expert, state)
             far = jnp.abs(jax.vmap(lambda amount, on=expert, at=seen: surprise(on, at, reward, amount))(each.amounts))
-            least.append(jnp.min(jnp.where(jnp.isfinite(each.past), far, jnp.inf)))
+            least.append(jnp.min(jnp.where(each.cost < best + HOPELESS, far, jnp.inf)))
             of_guess.append(jnp.abs(surprise(expert, seen, reward, guess.mean)))
         nearest = jnp.min(jnp.stack(least))
         return (nearest > SURPRISED) & (nearest > MORE_THAN_GUESS * jnp.stack(of_guess)[jnp.argmax(log_share)])
+
+    def _explains_nothing(self, own) -> Bool[Array, ""]:
+        """Whether the likeliest hypothesis is far from the window's rewards: they are of two tasks, or of none."""
+        _, _, heard, hypotheses = own
+        pasts = [jnp.where(jnp.isfinite(each.past), each.past, 0.0) for each in hypotheses]
+        in_window = jnp.stack([jnp.min(each.cost - past) for each, past in zip(hypotheses, pasts, strict=True)])
+        return jnp.min(in_window) > 0.5 * SURPRISED**2 * jnp.minimum(heard, self._window)
 
     def _belief(self, guess: Belief, log_share, hypotheses: Sequence[Hypotheses]) -> Belief:
         """The likeliest hypothesis of each expert; where another family than the encoder's explains more, kinds with
@@ -145,6 +153,11 @@ class Sharpened(eqx.Module):
             mean,
             jnp.concatenate([guess.variance[: self.decoder.kinds], *(each.variance[0] for each in hypotheses)]),
         )
+
+
+def _least(hypotheses: Sequence[Hypotheses]) -> Float[Array, ""]:
+    """Cost of the likeliest of all [nats]."""
+    return jnp.min(jnp.stack([jnp.min(each.cost) for each in hypotheses]))
 
 
 def can_sharpen(encoder: Encoder, decoder: Decoder, families: FamilySet) -> bool:
