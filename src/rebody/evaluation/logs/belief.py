@@ -79,10 +79,10 @@ class BeliefOverTime:
         return float(self.time_s[broken[-1] + 1 if broken.size else 0])
 
 
-def believe(inference: Inference, decisions: Decisions, sharpen: bool = True) -> BeliefOverTime:
+def believe(inference: Inference, decisions: Decisions, sharpen: bool = False) -> BeliefOverTime:
     """Let a module hear a run, decision by decision; where there is no reward, nothing was heard.
 
-    Without `sharpen` its beliefs stay as the encoder has them.
+    With `sharpen` its beliefs are refined (docs/sharp-beliefs.md).
     """
     states = [dict(zip(decisions.fields, at, strict=True)) for at in zip(*decisions.fields.values(), strict=True)]
     belief = inference.begin(states[0], sharpen)
