@@ -23,7 +23,7 @@ from rebody.agents.clock import begin, decide
 from rebody.agents.parts import Inference, load_inference
 from rebody.agents.rollout import rollout_on_toy
 from rebody.tasks.task_file import TaskSpec, active_tasks, read_tasks
-from rebody.types import DECISION_DT
+from rebody.types import DECISION_DT, global_state
 
 TASKS = Path(__file__).parent / "tasks"
 SHORT, LONG, STILL = 200, 300, 600
@@ -83,7 +83,7 @@ def beliefs(module: Inference, tasks: list[TaskSpec], decisions: int, sharpen: b
 def decision_s(module: Inference, sharpen: bool, times: int = 200) -> float:
     """Seconds of one decision for one body."""
     agent, toy = build_agent("readout", module, sharpen=sharpen), module.toy
-    state = toy.observe(toy.initial(np.zeros((), np.float32), np.zeros((), np.float32)))
+    state = toy.observe(toy.begin(global_state(x=np.zeros((), np.float32))))
     carry, _ = begin(agent, state)
     heard = Observation(state, np.asarray(-1.0, np.float32))
     for _ in range(2):

@@ -10,7 +10,7 @@ from pathlib import Path
 POINT_MASS = "point-mass"
 ROBOTS = Path(__file__).parent / "bodies" / "robots"
 ARTIFACTS = Path(__file__).parent / "artifacts"
-FAMILIES = (Path(__file__).parent / "tasks" / "line.py",)
+FAMILIES = tuple(Path(__file__).parent / "tasks" / f"{name}.py" for name in ("line", "plane"))
 """Files whose top level has the families that ship."""
 PRESETS = Path(__file__).parent / "training" / "inference" / "presets.py"
 

@@ -58,10 +58,15 @@ class Box:
     low: tuple[Finite, ...]
     high: tuple[Finite, ...]
 
+    polar: bool = False
+    """Whether its two numbers are a vector's length and its bearing [rad], so that it is a ring or a sector of one."""
+
     def __post_init__(self):
         """ValueError for ends that are none."""
         if not self.low or len(self.low) != len(self.high):
             raise ValueError("low and high must be as many numbers each, at least one")
+        if self.polar and (self.size != 2 or self.low[0] < 0):
+            raise ValueError("a polar one has two numbers, a length that is not negative and a bearing")
         if not all(low <= high for low, high in zip(self.low, self.high, strict=True)):
             raise ValueError(f"from {list(self.low)} to {list(self.high)} there is nothing")
 
@@ -71,8 +76,16 @@ class Box:
         return len(self.low)
 
     @property
+    def around(self) -> "Box":
+        """Itself, or the square around a ring."""
+        outer = self.high[0]
+        return Box((-outer, -outer), (outer, outer)) if self.polar else self
+
+    @property
     def largest(self) -> tuple[float, ...]:
         """The largest |number| of each axis."""
+        if self.polar:
+            return self.around.largest
         return tuple(max(abs(low), abs(high)) for low, high in zip(self.low, self.high, strict=True))
 
 

@@ -158,7 +158,7 @@ def test_toy_episodes_are_those_stepped_by_hand(agent, inference):
     tasks, families = lasting(*TARGETS), FamilySet((GOAL,))  # whose reward is relative
     episodes = rollout_on_toy(agent, inference.toy, tasks, families)
     step = eqx.filter_jit(lambda toy, body, action: toy.step(body, action, jax.random.key(0)))
-    body = inference.toy.initial(jnp.zeros(3), jnp.zeros(3))
+    body = inference.toy.begin(global_state(x=jnp.zeros(3)))
     carry, command = begin(agent, inference.toy.observe(body))
     for i in range(WINDOW):
         body = step(inference.toy, body, command.action)

@@ -6,42 +6,59 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from rebody.bodies.disturbance import CALM, Randomisation, no_disturbance
 from rebody.bodies.toys import (
+    AXES,
+    RATES,
     FullToy,
     MassDamper,
+    PlaneToy,
     PositionToy,
-    Randomisation,
+    SpaceToy,
     describe_toy,
     make_toy,
-    no_disturbance,
 )
 from rebody.errors import RebodyError
-from rebody.types import DECISION_DT, GLOBAL_FIELDS, GlobalState
+from rebody.types import DECISION_DT, GLOBAL_FIELDS, GlobalState, global_state
 
-FULL = FullToy()
-TOYS = [MassDamper(), PositionToy(), FULL]
+FULL, PLANE = FullToy(), PlaneToy()
+TOYS = [MassDamper(), PositionToy(), FULL, PLANE, SpaceToy()]
 step = eqx.filter_jit(lambda toy, state, action, key: toy.step(state, action, key))
 
 
-def roll(toy, actions, *, pitch=0.0, **disturbance):
-    """States after each action of one toy that starts at rest; fields of its disturbance by name.
+class Course:
+    """States of a toy, its axes by name: `x`, `vx`, and `drift_x`, `force_x` of what lies behind."""
+
+    def __init__(self, states):
+        self.time = np.asarray(states.time)
+        for i, (axis, rate) in enumerate(zip(AXES, RATES, strict=True)):
+            for name, along in ((axis, "position"), (rate, "velocity"), (f"drift_{axis}", "drift")):
+                setattr(self, name, np.asarray(getattr(states, along))[..., i])
+            setattr(self, f"force_{axis}", np.asarray(states.force)[..., i])
+
+
+def states_of(toy, actions, *, start=None, **disturbance):
+    """States after each action of one toy that starts at rest, or where `start` says; its disturbance's fields by name.
 
     An action is one number for all that a toy's action consists of, or all of them.
     """
     fields = tuple(disturbance)
     values = tuple(jnp.asarray(value, jnp.float32) for value in disturbance.values())
     nominal = no_disturbance(())
-    state = toy.initial(
-        jnp.zeros(()),
-        jnp.zeros(()),
+    state = toy.begin(
+        start or global_state(x=jnp.zeros(())),
         eqx.tree_at(lambda d: tuple(getattr(d, field) for field in fields), nominal, values) if fields else nominal,
-        pitch,
     )
     states = []
     for key, action in zip(jax.random.split(jax.random.key(0), len(actions)), actions, strict=True):
         state = step(toy, state, jnp.broadcast_to(jnp.asarray(action, jnp.float32), (toy.actions,)), key)
         states.append(state)
     return jax.tree.map(lambda *leaves: np.stack(leaves), *states)
+
+
+def roll(toy, actions, *, pitch=0.0, **disturbance):
+    """The course of `states_of`, from rest at a pitch."""
+    return Course(states_of(toy, actions, start=global_state(pitch=jnp.asarray(pitch, jnp.float32)), **disturbance))
 
 
 def random_actions(steps=50):
@@ -85,12 +102,12 @@ def test_ripple_is_a_sine_on_the_velocity():
     times = DECISION_DT * np.arange(1, len(actions) + 1)
     wave = 0.4 * np.sin(2 * np.pi * times / 0.5 + 0.3)
     np.testing.assert_allclose(rippled.vx - plain.vx, wave, atol=1e-4)
-    np.testing.assert_array_equal(rippled.drift, plain.drift)
+    np.testing.assert_array_equal(rippled.drift_x, plain.drift_x)
 
 
 def test_lag_is_a_first_order_delay_of_the_force():
     # share of the difference made up in each step: dt / (dt + lag) = 1/4
-    force = roll(MassDamper(), [1.0] * 3, lag=0.3).force
+    force = roll(MassDamper(), [1.0] * 3, lag=0.3).force_x
     np.testing.assert_allclose(force, 7 * (1 - 0.75 ** np.arange(1, 4)), rtol=1e-5)
 
 
@@ -103,25 +120,24 @@ def test_gain_weakens_the_action(toy):
 
 @pytest.mark.parametrize("toy", TOYS)
 def test_noise_has_its_standard_deviation(toy):
-    states = toy.initial(
-        jnp.zeros(20_000),
-        jnp.zeros(20_000),
-        eqx.tree_at(lambda d: d.state_noise, no_disturbance((20_000,)), jnp.full(20_000, 0.2)),
-    )
+    noisy = eqx.tree_at(lambda d: d.state_noise, no_disturbance((20_000,)), jnp.full(20_000, 0.2))
+    states = toy.begin(global_state(x=jnp.zeros(20_000)), noisy)
     after = step(toy, states, jnp.zeros((20_000, toy.actions)), jax.random.key(1))
-    noise_of_x = np.asarray(after.x - DECISION_DT * after.vx)
-    assert noise_of_x.mean() == pytest.approx(0.0, abs=0.01)
-    assert noise_of_x.std() == pytest.approx(0.2, rel=0.03)
-    assert np.asarray(after.drift).std() == pytest.approx(0.2 if isinstance(toy, MassDamper) else 0, rel=0.03)
+    has_momentum = isinstance(toy, MassDamper)
+    for axis in range(len(AXES)):
+        felt = 0.2 if AXES[axis] in toy.axes and AXES[axis] in ("x", "y") else 0.0
+        noise = np.asarray(after.position - DECISION_DT * after.velocity)[:, axis]
+        assert noise.mean() == pytest.approx(0.0, abs=0.01)
+        assert noise.std() == pytest.approx(felt, rel=0.03)
+        assert np.asarray(after.drift)[:, axis].std() == pytest.approx(felt if has_momentum else 0.0, rel=0.03)
 
 
 @pytest.mark.parametrize("toy", TOYS)
 def test_a_nominal_toy_does_not_depend_on_the_key(toy):
-    state, action = toy.initial(jnp.ones(3), jnp.ones(3)), jnp.ones((3, toy.actions))
+    state, action = toy.begin(global_state(x=jnp.ones(3), vx=jnp.ones(3))), jnp.ones((3, toy.actions))
     one, other = (step(toy, state, action, jax.random.key(seed)) for seed in (0, 1))
     jax.tree.map(np.testing.assert_array_equal, one, other)
-    np.testing.assert_array_equal(one.vx, one.drift)
-    np.testing.assert_array_equal(one.pitch_rate, one.turn)
+    np.testing.assert_array_equal(one.velocity, one.drift)
 
 
 def test_randomisation_stays_in_its_ranges():
@@ -130,6 +146,8 @@ def test_randomisation_stays_in_its_ranges():
         (drawn.ripple_amplitude, 0.0, 0.6),
         (drawn.ripple_period, 0.2, 0.8),
         (drawn.pitch_ripple, 0.0, 1.0),
+        (drawn.across_ripple, 0.0, 0.3),
+        (drawn.yaw_ripple, 0.0, 0.5),
         (drawn.lag, 0.0, 0.5),
         (drawn.gain, 0.5, 1.0),
     ]:
@@ -137,14 +155,14 @@ def test_randomisation_stays_in_its_ranges():
         assert high >= values.max() > high - 0.05 * (high - low)
     np.testing.assert_allclose(drawn.state_noise, 0.2, rtol=1e-6)
     parts = np.stack(jax.tree.leaves(drawn))
-    apart = np.corrcoef(parts[parts.std(axis=1) > 1e-6]) - np.eye(6)
+    apart = np.corrcoef(parts[parts.std(axis=1) > 1e-6]) - np.eye(8)
     assert np.abs(apart).max() < 0.15  # each is drawn for itself
 
 
 @pytest.mark.parametrize("toy", TOYS)
 @pytest.mark.parametrize("shape", [(), (3,), (2, 3)])
 def test_any_batch_shape(toy, shape):
-    state = toy.initial(jnp.zeros(shape), jnp.zeros(shape), Randomisation().sample(jax.random.key(0), shape))
+    state = toy.begin(global_state(x=jnp.zeros(shape)), Randomisation().sample(jax.random.key(0), shape))
     after = step(toy, state, jnp.ones((*shape, toy.actions)), jax.random.key(0))
     observed = toy.observe(after)
     assert isinstance(observed, GlobalState)
@@ -155,23 +173,29 @@ FULL_REST = 100  # decisions after which nothing moves any more
 
 
 def test_one_action_for_each_thing_that_a_toy_can_do():
-    assert [toy.actions for toy in TOYS] == [1, 1, 3]
-    assert [toy.max_pitch for toy in TOYS] == [0.0, 0.0, 2.25]
+    assert [toy.actions for toy in TOYS] == [1, 1, 3, 3, 5]
+    assert [toy.max_pitch for toy in TOYS] == [0.0, 0.0, 2.25, 0.0, 2.25]
+    assert [toy.axes for toy in TOYS] == [("x",), ("x",), ("x", "z", "pitch"), ("x", "y", "yaw"), AXES]
 
 
 def test_along_x_the_full_toy_is_the_mass_damper():
     actions, disturbance = full_actions(), {"ripple_amplitude": 0.4, "lag": 0.3, "gain": 0.7, "state_noise": 0.1}
     full = roll(FULL, actions, ripple_period=0.5, pitch_ripple=0.8, **disturbance)
     plain = roll(MassDamper(), actions[:, :1], ripple_period=0.5, **disturbance)
-    for name in ("x", "vx", "drift", "force", "time"):
-        np.testing.assert_array_equal(getattr(full, name), getattr(plain, name))
+    for name in ("x", "vx", "drift_x", "force_x", "time"):
+        np.testing.assert_allclose(getattr(full, name), getattr(plain, name), atol=1e-6)
 
 
-@pytest.mark.parametrize("toy", [MassDamper(), PositionToy()])
-def test_the_others_neither_jump_nor_pitch(toy):
-    states = roll(toy, random_actions(), ripple_amplitude=0.3, ripple_period=0.5, pitch_ripple=1.0)
-    for name in ("z", "vz", "pitch", "pitch_rate", "turn", "torque"):
-        assert not getattr(states, name).any()
+@pytest.mark.parametrize("toy", TOYS)
+def test_along_held_axes_nothing_moves(toy):
+    rough = {name: 0.7 for name in ("ripple_amplitude", "pitch_ripple", "across_ripple", "yaw_ripple", "state_noise")}
+    wild = {field: jnp.asarray(1.5) for field in GLOBAL_FIELDS}
+    actions = np.random.default_rng(0).uniform(-1, 1, (50, toy.actions))
+    states = states_of(toy, actions, start=GlobalState(**wild), ripple_period=0.53, ripple_phase=0.4, **rough)
+    for name in ("position", "velocity", "drift", "force"):
+        moved = np.abs(getattr(states, name)).max(axis=0) > 0
+        expected = toy.moves & (np.array(AXES) != "z") if name == "force" else toy.moves
+        np.testing.assert_array_equal(moved, expected & (name != "force" or not isinstance(toy, PositionToy)))
 
 
 def test_the_floor_carries():
@@ -215,9 +239,9 @@ def test_after_a_landing_it_jumps_as_high_again():
 def test_pitch_by_hand():
     # turn1 = 0.1 * 9 = 0.9, pitch1 = 0.09; turn2 = 0.9 + 0.1 * (9 - 4 * 0.9 - 4 * 0.09) = 1.404
     states = roll(FULL, [[0.0, 0.0, 1.0]] * 2)
-    np.testing.assert_allclose(states.turn, [0.9, 1.404], rtol=1e-6)
+    np.testing.assert_allclose(states.drift_pitch, [0.9, 1.404], rtol=1e-6)
     np.testing.assert_allclose(states.pitch, [0.09, 0.2304], rtol=1e-6)
-    np.testing.assert_array_equal(states.torque, [9.0, 9.0])
+    np.testing.assert_array_equal(states.force_pitch, [9.0, 9.0])
 
 
 @pytest.mark.parametrize("toy", [FULL, FullToy(max_torque=3.0, stiffness=6.0, turn_damping=5.0)])
@@ -234,7 +258,7 @@ def test_no_torque_takes_it_beyond_from_rest():
     swings = np.sign(np.sin(np.arange(300) / rng.uniform(0.5, 20, (40, 1))))  # in time with any swing
     noise = rng.uniform(-3, 3, (40, 300))
     for share in (swings, noise):
-        state = FULL.initial(jnp.zeros(40), jnp.zeros(40))
+        state = FULL.begin(global_state(x=jnp.zeros(40)))
         actions = jnp.asarray(share[:, :, None] * [0, 0, 1], jnp.float32)
         advance = eqx.filter_jit(
             lambda state, actions: jax.lax.scan(
@@ -242,7 +266,7 @@ def test_no_torque_takes_it_beyond_from_rest():
             )
         )
         _, states = advance(state, jnp.swapaxes(actions, 0, 1))
-        assert 0.5 < np.abs(states.pitch).max() <= FULL.max_pitch + 1e-5
+        assert 0.5 < np.abs(Course(states).pitch).max() <= FULL.max_pitch + 1e-5
 
 
 def test_a_spring_rights_it():
@@ -269,8 +293,8 @@ def test_pitch_ripples_with_the_velocity():
     waves = {"ripple_period": 0.5, "ripple_phase": 0.3}
     states = roll(FULL, actions, ripple_amplitude=0.2, pitch_ripple=0.8, **waves)
     wave = np.sin(2 * np.pi * DECISION_DT * np.arange(1, 31) / 0.5 + 0.3)
-    np.testing.assert_allclose(states.vx - states.drift, 0.2 * wave, atol=1e-4)
-    np.testing.assert_allclose(states.pitch_rate - states.turn, 0.8 * wave, atol=1e-4)
+    np.testing.assert_allclose(states.vx - states.drift_x, 0.2 * wave, atol=1e-4)
+    np.testing.assert_allclose(states.pitch_rate - states.drift_pitch, 0.8 * wave, atol=1e-4)
     calm = roll(FULL, actions, ripple_amplitude=0.2, **waves)
     np.testing.assert_array_equal(calm.vx, states.vx)
     assert not calm.pitch.any()
@@ -279,51 +303,95 @@ def test_pitch_ripples_with_the_velocity():
 def test_lag_and_gain_are_those_of_the_torque_too():
     states = roll(FULL, [[1.0, 0.0, 1.0]] * 3, lag=0.3, gain=0.5)
     arrived = 0.5 * (1 - 0.75 ** np.arange(1, 4))
-    np.testing.assert_allclose(states.force, 7 * arrived, rtol=1e-5)
-    np.testing.assert_allclose(states.torque, 9 * arrived, rtol=1e-5)
+    np.testing.assert_allclose(states.force_x, 7 * arrived, rtol=1e-5)
+    np.testing.assert_allclose(states.force_pitch, 9 * arrived, rtol=1e-5)
 
 
-def test_what_is_seen_of_the_full_toy():
-    state = FULL.initial(jnp.zeros(4), jnp.zeros(4))
+@pytest.mark.parametrize("toy", TOYS)
+def test_what_is_seen_of_a_toy(toy):
+    state = toy.begin(global_state(x=jnp.zeros(4)))
     for key in jax.random.split(jax.random.key(0), 3):
-        state = step(FULL, state, jnp.asarray([[1.0, 1.0, 1.0]] * 4), key)
-    seen = FULL.observe(state)
-    held = {"y", "vy", "roll", "roll_rate", "yaw", "yaw_rate"}
-    for name in set(GLOBAL_FIELDS) - held:
-        np.testing.assert_array_equal(getattr(seen, name), getattr(state, name))
-        assert np.abs(getattr(seen, name)).min() > 0
-    assert not any(np.asarray(getattr(seen, name)).any() for name in held)
+        state = step(toy, state, jnp.ones((4, toy.actions)), key)
+    seen, course = toy.observe(state), Course(state)
+    for axis, rate in zip(AXES, RATES, strict=True):
+        for name in (axis, rate):
+            np.testing.assert_array_equal(getattr(seen, name), getattr(course, name))
+            assert bool(np.abs(getattr(seen, name)).min() > 0) == (axis in toy.axes)
+    assert not np.asarray(seen.roll).any()
+    assert not np.asarray(seen.roll_rate).any()
 
 
-def test_the_full_toy_goes_on_from_where_any_body_is():
+@pytest.mark.parametrize("toy", TOYS)
+def test_a_toy_goes_on_from_where_any_body_is(toy):
     """A nominal toy that is taken up in mid-flight does what it would have done."""
-    actions = full_actions(20)
-    actions[:, 1] = 1.0
-    states = roll(FULL, actions)
-    middle = jax.tree.map(lambda leaf: jnp.asarray(leaf[11]), states)
-    again = FULL.from_global(FULL.observe(middle))
-    assert middle.z > 0.1
+    actions = np.random.default_rng(0).uniform(-1, 1, (20, toy.actions))
+    if "z" in toy.axes:
+        actions[:, toy.axes.index("z")] = 1.0
+    states = states_of(toy, actions)
+    again = toy.begin(toy.observe(jax.tree.map(lambda leaf: jnp.asarray(leaf[11]), states)))
     for i in range(12, 20):
-        again = step(FULL, again, jnp.asarray(actions[i], jnp.float32), jax.random.key(0))
+        again = step(toy, again, jnp.asarray(actions[i], jnp.float32), jax.random.key(0))
+    last = toy.observe(jax.tree.map(lambda leaf: jnp.asarray(leaf[-1]), states))
     for name in GLOBAL_FIELDS:
-        np.testing.assert_allclose(
-            getattr(FULL.observe(again), name), getattr(FULL.observe(states), name)[-1], atol=1e-5
+        np.testing.assert_allclose(getattr(toy.observe(again), name), getattr(last, name), atol=1e-5)
+
+
+def test_the_plane_is_two_lines():
+    """Forces along x and y do not know each other; a torque turns by up to 9 / 4 rad/s."""
+    actions = np.random.default_rng(0).uniform(-1, 1, (50, 3))
+    states = roll(PLANE, actions)
+    for axis, i in (("x", 0), ("y", 1)):
+        np.testing.assert_allclose(getattr(states, axis), roll(MassDamper(), actions[:, i : i + 1]).x, atol=1e-5)
+    assert roll(PLANE, [[0.0, 0.0, 1.0]] * 60).yaw_rate[-1] == pytest.approx(2.25, abs=1e-4)
+
+
+def test_a_heading_wraps_where_it_is_seen():
+    states = states_of(PLANE, [[0.0, 0.0, 1.0]] * 40)
+    yaw = np.asarray(PLANE.observe(jax.tree.map(jnp.asarray, states)).yaw)
+    assert states.position[-1, 4] > 2 * np.pi
+    assert np.abs(yaw).max() <= np.pi
+    np.testing.assert_allclose(np.cos(yaw), np.cos(states.position[:, 4]), atol=1e-5)
+
+
+def test_a_gait_is_in_the_frame_of_the_heading():
+    """It ripples along the heading at every step, sways across it and in it at every second one."""
+    waves = {"ripple_period": 0.5, "ripple_phase": 0.3}
+    phase = 2 * np.pi * DECISION_DT * np.arange(1, 31) / 0.5 + 0.3
+    for yaw, along, across in ((0.0, "x", "y"), (np.pi / 2, "y", "x")):
+        start = global_state(yaw=jnp.asarray(yaw))
+        states = Course(
+            states_of(PLANE, np.zeros((30, 3)), start=start, ripple_amplitude=0.4, across_ripple=0.2, **waves)
         )
+        rates = dict(zip(AXES, RATES, strict=True))
+        sign = 1.0 if across == "y" else -1.0
+        np.testing.assert_allclose(getattr(states, rates[along]), 0.4 * np.sin(phase), atol=1e-4)
+        np.testing.assert_allclose(getattr(states, rates[across]), sign * 0.2 * np.sin(phase / 2), atol=1e-4)
+    swaying = roll(PLANE, np.zeros((30, 3)), yaw_ripple=0.6, **waves)
+    np.testing.assert_allclose(swaying.yaw_rate, 0.6 * np.sin(phase / 2), atol=1e-4)
+    assert not swaying.x.any()
 
 
-def test_a_pitch_to_start_with():
-    state = FULL.initial(jnp.zeros(3), jnp.ones(3), pitch=jnp.asarray([-1.0, 0.0, 2.0]))
-    np.testing.assert_array_equal(state.pitch, [-1.0, 0.0, 2.0])
-    assert not np.asarray(state.pitch_rate).any()
-    assert not np.asarray(state.turn).any()
-    np.testing.assert_array_equal(FULL.initial(jnp.zeros(3), jnp.zeros(3), pitch=0.5).pitch, [0.5] * 3)
+def test_one_that_turns_first_runs_where_it_faces():
+    toy = PlaneToy(turns_first=True)
+    start = global_state(yaw=jnp.asarray(np.pi / 2))
+    sideways, ahead = (
+        Course(states_of(toy, [action] * 10, start=start)) for action in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    )
+    np.testing.assert_allclose([sideways.x, sideways.y], 0.0, atol=1e-5)
+    np.testing.assert_allclose(ahead.y, roll(PLANE, [[0.0, 1.0, 0.0]] * 10).y, atol=1e-5)
+    oblique = Course(states_of(toy, [[0.8, 0.4, 0.0]], start=global_state(yaw=jnp.asarray(0.5))))
+    share = 0.8 * np.cos(0.5) + 0.4 * np.sin(0.5)
+    np.testing.assert_allclose([oblique.vx[0], oblique.vy[0]], 0.7 * share * np.array([np.cos(0.5), np.sin(0.5)]), 1e-5)
 
 
-def test_from_global_takes_the_place_of_any_body():
-    state = MassDamper().initial(jnp.asarray([2.0]), jnp.asarray([-1.0]))
-    again = MassDamper().from_global(MassDamper().observe(state))
-    np.testing.assert_array_equal(again.x, [2.0])
-    np.testing.assert_array_equal(again.drift, [-1.0])
+@pytest.mark.parametrize("toy", TOYS)
+def test_nothing_disturbs_where_it_is_calm(toy):
+    actions = np.random.default_rng(0).uniform(-1, 1, (20, toy.actions))
+    calm = jax.tree.map(lambda leaf: leaf[0], CALM.sample(jax.random.key(0), (1,)))
+    state = toy.begin(global_state(x=jnp.zeros(())), calm)
+    for action in actions:
+        state = step(toy, state, jnp.asarray(action, jnp.float32), jax.random.key(1))
+    np.testing.assert_array_equal(state.position, states_of(toy, actions).position[-1])
 
 
 @pytest.mark.parametrize(
@@ -345,6 +413,8 @@ def test_from_global_takes_the_place_of_any_body():
                 "stiffness": 4.0,
                 "turn_damping": 4.0,
                 "max_torque": 3.0,
+                "held": ("y", "yaw"),
+                "turns_first": False,
             },
         ),
     ],
@@ -356,5 +426,5 @@ def test_a_toy_is_made_again_from_its_description(toy, described):
 
 def test_toys_have_names():
     assert make_toy("position") == PositionToy()
-    with pytest.raises(RebodyError, match=r"unknown toy 'spring'\. Toys are: mass-damper, position, full"):
+    with pytest.raises(RebodyError, match=r"unknown toy 'spring'\. Toys are: mass-damper, position, full, plane, space"):
         make_toy("spring")

@@ -245,7 +245,7 @@ def test_a_module_of_the_full_toy_is_what_was_asked_for(full_module):
     assert loaded.parts.probe.families == loaded.contract.families
     log = (full_module / "log.csv").read_text().splitlines()
     assert len(log) == 5
-    assert {"kl", "mixture/components", "told/critic_loss"} <= set(log[0].split(","))
+    assert {"kl", "mixture/components", "told/return"} <= set(log[0].split(","))
     card = (full_module / "card.md").read_text()
     for said in ("stand median", "decisions to a new base task", "false changes in 1000", "family ARI of 2000 beliefs"):
         assert said in card

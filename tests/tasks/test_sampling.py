@@ -9,6 +9,7 @@ from rebody.ranges import Box, interval
 from rebody.tasks import FamilySet
 from rebody.tasks.family_set import draw, sample, sample_episodes
 from rebody.tasks.line import GOAL, VELOCITY
+from rebody.tasks.plane import PLANE, ring
 
 FAMILIES = FamilySet((GOAL.within(interval(-15.0, -2.0), interval(2.0, 15.0)), VELOCITY.within(interval(1.0, 3.0))))
 OF_GOAL, OF_VELOCITY = 0, 1
@@ -122,3 +123,36 @@ def test_no_task_changes_or_every_one(share, changing):
 
 def test_an_episode_of_one_decision_has_one_task():
     assert sample_episodes(FAMILIES, jax.random.key(0), 5, 1, 1.0).target.shape == (5, 1, 1)
+
+
+@pytest.mark.parametrize("of_numpy", [False, True])
+def test_in_a_ring_length_and_bearing_are_uniform(of_numpy):
+    sector = FamilySet((PLANE.named("place").within(Box((2.0, 0.5), (6.0, 2.0), polar=True)), GOAL))
+    for families, low, high in ((PLANE.only(("place",)), (2.0, -np.pi), (15.0, np.pi)), (sector, (2.0, 0.5), (6.0, 2.0))):
+        if of_numpy:
+            rng = np.random.default_rng(0)
+            tasks = [draw(families, rng) for _ in range(6000)]
+            family, target = (np.stack(part) for part in zip(*((t.family, t.target) for t in tasks), strict=True))
+        else:
+            drawn = sample(families, jax.random.key(2), (6000,))
+            family, target = np.asarray(drawn.family), np.asarray(drawn.target)
+        x, y = target[family == 0].T
+        polar = np.stack([np.hypot(x, y), np.arctan2(y, x)], axis=-1)
+        share = (polar - low) / np.subtract(high, low)
+        assert share.min() > -1e-5
+        assert share.max() < 1 + 1e-5
+        quartiles = np.quantile(share, [0.25, 0.5, 0.75], axis=0)
+        np.testing.assert_allclose(quartiles, np.tile([[0.25], [0.5], [0.75]], 2), atol=0.04)
+
+
+def test_what_is_around_a_ring():
+    assert ring(2.0, 15.0).around == Box((-15.0, -15.0), (15.0, 15.0))
+    assert ring(2.0, 15.0).largest == (15.0, 15.0)
+    assert PLANE.named("place").range == Box((-15.0, -15.0), (15.0, 15.0))
+    assert Box((1.0,), (2.0,)).around == Box((1.0,), (2.0,))
+
+
+@pytest.mark.parametrize(("low", "high"), [((1.0,), (2.0,)), ((-1.0, 0.0), (2.0, 1.0)), ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))])
+def test_a_polar_box_is_of_a_plane(low, high):
+    with pytest.raises(ValueError, match="a polar one has two numbers, a length that is not negative and a bearing"):
+        Box(low, high, polar=True)

@@ -109,9 +109,6 @@ class Agent(eqx.Module):
 class ReuseAgent(Agent):
     """The toy's frozen policy, imagined from where the robot is (thesis 5.6.2, 6.4)."""
 
-    interpret: Callable[[Belief], Belief]
-    """What the policy sees of a belief."""
-    high_level: HighLevelPolicy
     toy: Toy
     slots: SlotChooser
     """Which slot a robot's subgoals go to; a point mass has none."""
@@ -127,13 +124,37 @@ class ReuseAgent(Agent):
         """Where the nominal toy would be after each of `horizon` decisions, [decision, *batch], the belief held."""
         return self.toy.imagine(state, self.acting(belief), self.horizon)
 
+    @abstractmethod
     def acting(self, belief: Belief) -> Callable[[GlobalState], Float[AnyArray, "*batch action"]]:
         """What moves the toy while this is believed."""
+
+
+class BelievingReuseAgent(ReuseAgent):
+    """By a policy that learned to act by beliefs."""
+
+    interpret: Callable[[Belief], Belief]
+    """What the policy sees of a belief."""
+    high_level: HighLevelPolicy
+
+    def acting(self, belief: Belief) -> Callable[[GlobalState], Float[AnyArray, "*batch action"]]:
+        """That policy."""
         understood = self.interpret(belief)
         return lambda state: self.high_level(state, understood)
 
 
-class SharpReuseAgent(ReuseAgent):
+class ToldReuseAgent(ReuseAgent):
+    """By a policy that is told the task: the likeliest one."""
+
+    told_policy: HighLevelPolicy
+    task_code: TaskCode
+
+    def acting(self, belief: Belief) -> Callable[[GlobalState], Float[AnyArray, "*batch action"]]:
+        """That policy."""
+        told = self.task_code(Task(*self.reader(belief)))
+        return lambda state: self.told_policy(state, told)
+
+
+class SharpReuseAgent(BelievingReuseAgent):
     """`reuse` of sharpened beliefs: where a target is known for sure, the toy's policy is the one that was told it.
 
     A policy that learned with an encoder's beliefs is as exact as those were. Both are frozen, and learned on the toy.

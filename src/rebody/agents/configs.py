@@ -6,7 +6,7 @@ nothing is built from may be missing. `training` holds the settings of the run: 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
@@ -54,6 +54,8 @@ class ToyPolicySettings:
     """What each of them is divided by [m, rad, m/s]."""
     hidden: Layers
     projections: Number
+    acts_by: Literal["belief", "task"] = "belief"
+    """Whether one was learned that goes by beliefs, or that alone which is told the task."""
 
 
 @dataclass(frozen=True)

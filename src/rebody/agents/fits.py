@@ -53,7 +53,7 @@ def check_slots(part: LoadedSlots, module: Inference) -> None:
 
 
 def _check_places(name: str, places: Places, module: Inference) -> None:
-    if places != module.parts.high_level.view.places:
+    if places != module.places:
         raise _misfit(name, "the places that it sees are not those that the module's beliefs speak of")
 
 

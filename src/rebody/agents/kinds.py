@@ -13,8 +13,9 @@ from rebody.agents.agent import (
     OracleAgent,
     ReadoutAgent,
     RetrainAgent,
-    ReuseAgent,
+    BelievingReuseAgent,
     SharpReuseAgent,
+    ToldReuseAgent,
 )
 from rebody.agents.parts import Inference, ScratchParts
 from rebody.agents.slots import OneSlot, SlotChooser
@@ -81,15 +82,16 @@ class Kind:
 def _reuse(of: Ingredients) -> Agent:
     parts = of.inference.parts
     made_of = of.believing_sharply | {
-        "interpret": parts.module.decoder.interpret,
-        "high_level": parts.high_level,
         "toy": of.inference.toy,
         "slots": of.slots or OneSlot(),  # a point mass has no slots: the first family stands for all
         "horizon": of.horizon,
     }
+    if parts.high_level is None:
+        return ToldReuseAgent(**made_of, **of.told)
+    by_belief = {"interpret": parts.module.decoder.interpret, "high_level": parts.high_level}
     if of.sharpen and of.inference.can_sharpen:
-        return SharpReuseAgent(**made_of, **of.told)
-    return ReuseAgent(**made_of)
+        return SharpReuseAgent(**made_of, **by_belief, **of.told)
+    return BelievingReuseAgent(**made_of, **by_belief)
 
 
 def _retrain(of: Ingredients) -> Agent:

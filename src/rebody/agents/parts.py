@@ -49,7 +49,7 @@ class InferenceParts(eqx.Module):
     """What an inference artifact holds: the frozen module, the toy's policies, and the probe."""
 
     module: InferenceModule
-    high_level: HighLevelPolicy  # acts by a belief
+    high_level: HighLevelPolicy | None  # acts by a belief, where there is one that learned to
     told_policy: HighLevelPolicy  # the same, told the task: the toy's oracle
     probe: Probe
     mixture: MixturePrior | None  # the clusters of beliefs, where there is a mixture
@@ -63,6 +63,15 @@ class Inference:
     contract: Contract
     parts: InferenceParts
     toy: Toy
+
+    @property
+    def places(self) -> Places:
+        """What its beliefs say the places of, in units of the encoder's scales; none for a latent that is not split."""
+        decoder = self.parts.module.decoder
+        if decoder.choice is None:
+            return ()
+        of_each = zip(self.contract.families, decoder.experts, strict=True)
+        return tuple(Place(family.quantity, expert.scales) for family, expert in of_each)
 
     @property
     def task_code(self) -> TaskCode:
@@ -183,7 +192,7 @@ def inference_template(settings: InferenceSettings) -> InferenceParts:
     view, told = PolicyView(policy.fields, policy.scales, module_places(module, families)), places_of(families)
     return InferenceParts(
         module=InferenceModule(module, families, actions, jax.random.key(0)),
-        high_level=_policy_template(view, module.latent, actions, policy),
+        high_level=_policy_template(view, module.latent, actions, policy) if policy.acts_by == "belief" else None,
         told_policy=_policy_template(told_view(view, families), len(told) + numbers_of(told), actions, policy),
         probe=unfitted(families, module.latent),
         mixture=no_mixture(mixture.maximum, module.clustered) if mixture else None,

@@ -12,9 +12,10 @@ from rebody.agents.agent import Agent, Observation
 from rebody.agents.clock import Clock, EvenClock
 from rebody.agents.controller import Controller
 from rebody.bodies import RobotBatch, RobotSpec, Simulation
-from rebody.bodies.toys import Disturbance, Toy
+from rebody.bodies.disturbance import Disturbance
+from rebody.bodies.toys import Toy
 from rebody.tasks import FamilySet
-from rebody.types import AnyArray, Belief, GlobalState, Pose, Subgoal, Task
+from rebody.types import AnyArray, Belief, GlobalState, Pose, Subgoal, Task, global_state
 
 Starts = Sequence[int] | Int[np.ndarray, " episode"]
 """What the reset noise of each episode is drawn from."""
@@ -35,9 +36,9 @@ class Episodes(eqx.Module):
 def rollout_on_toy(
     agent: Agent, toy: Toy, tasks: Task, families: FamilySet, disturbance: Disturbance | None = None
 ) -> Episodes:
-    """Episodes on a toy from x = 0 at rest; `tasks` are the active ones, [time, episode], of `families`."""
+    """Episodes on a toy at home and at rest; `tasks` are the active ones, [time, episode], of `families`."""
     still = jnp.zeros(tasks.family.shape[1])
-    body = toy.initial(still, still, disturbance)
+    body = toy.begin(global_state(x=still), disturbance)
     carry, command = agent.begin(toy.observe(body))
 
     def advance(walk, inputs):

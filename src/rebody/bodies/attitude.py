@@ -1,5 +1,8 @@
 """Attitudes: angles that wrap, and quaternions, of which one and its negative are the same attitude."""
 
+from typing import Any
+
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -8,9 +11,10 @@ Quaternions = Float[np.ndarray, "... 4"]
 """Real part first, of length 1."""
 
 
-def wrap_angle(angle: Floats) -> Floats:
-    """An angle in (-pi, pi] [rad]."""
-    return np.asarray(-((np.pi - angle) % (2 * np.pi) - np.pi), angle.dtype)
+def wrap_angle(angle: Any) -> Any:
+    """An angle in (-pi, pi], of NumPy or JAX [rad]."""
+    wrapped = -((np.pi - angle) % (2 * np.pi) - np.pi)
+    return wrapped if isinstance(angle, jax.Array) else np.asarray(wrapped, angle.dtype)
 
 
 def product(first: Quaternions, second: Quaternions) -> Quaternions:

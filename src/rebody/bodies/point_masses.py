@@ -1,5 +1,6 @@
 """Point masses as bodies that are simulated from outside, a decision at a time."""
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import equinox as eqx
@@ -10,12 +11,16 @@ from jaxtyping import Float
 
 from rebody.bodies.simulation import Simulation
 from rebody.bodies.toy_models import toy_model
-from rebody.bodies.toys import Toy
+from rebody.bodies.toys import AXES, RATES, Toy
 from rebody.jax_settings import own_jax_settings
 from rebody.types import POSE_FIELDS, AnyArray, global_state
 
-FIELDS = ("x", "z", "pitch", "vx", "vz", "pitch_rate")
+FIELDS = AXES + RATES
 """What a nominal toy continues from; a state has them in this order."""
+JOINTS = ("x", "y", "z", "yaw", "pitch")
+"""Axes in the order of a model's joints."""
+ANYWHERE = ("x", "y", "yaw")
+"""Where a body may be and face without being another one."""
 
 
 class PointMasses(Simulation):
@@ -33,20 +38,24 @@ class PointMasses(Simulation):
         return toy_model(self._toy)
 
     def picture_pose(self):
-        """x, and where it has them z and pitch."""
-        return self._state[:, : self.model.nq].astype(np.float64)
+        """Its joints."""
+        return self._of(self._joints).astype(np.float64)
 
     def reset(self, rng, who=None):
         """There is no noise."""
         self._state[slice(None) if who is None else who] = 0.0
 
     def place(self, x, y=None, yaw=None, who=None):
-        """Along x."""
-        self._state[slice(None) if who is None else who, 0] = x
+        """Where it can move to."""
+        for axis, value in (("x", x), ("y", y), ("yaw", yaw)):
+            if value is not None and axis in self._joints:
+                self._state[slice(None) if who is None else who, FIELDS.index(axis)] = value
 
     def push(self, change):
         """A position toy, which moves by steps and has no momentum, does not mind."""
-        self._state[:, 3] += change if change.ndim == 1 else change[:, 0]
+        for axis, value in zip(("x", "y"), np.atleast_2d(change.T), strict=False):
+            if axis in self._joints:
+                self._state[:, FIELDS.index(axis) + len(AXES)] += value
 
     @own_jax_settings()
     def step(self, actions):
@@ -63,13 +72,24 @@ class PointMasses(Simulation):
         return self.observe().select(POSE_FIELDS).astype(np.float64)
 
     def joint_state(self):
-        """All but x."""
-        return self.observation()[:, 1:].astype(np.float32)
+        """All but where it is and faces."""
+        inner = [axis for axis in self._joints if axis not in ANYWHERE]
+        return np.concatenate([self._of(inner), self._rates], axis=-1).astype(np.float32)
 
     def observation(self):
         """As the model has them."""
-        count = self.model.nq
-        return self._state[:, [*range(count), *range(3, 3 + count)]].astype(np.float64)
+        return np.concatenate([self.picture_pose(), self._rates], axis=-1).astype(np.float64)
+
+    @property
+    def _joints(self) -> list[str]:
+        return [axis for axis in JOINTS if axis in self._toy.axes]
+
+    @property
+    def _rates(self) -> Float[np.ndarray, "body joint"]:
+        return self._of([RATES[AXES.index(axis)] for axis in self._joints])
+
+    def _of(self, fields: Sequence[str]) -> Float[np.ndarray, "body field"]:
+        return self._state[:, [FIELDS.index(field) for field in fields]]
 
     @property
     def fallen(self):
@@ -92,4 +112,4 @@ def _advance(
 ) -> Float[AnyArray, "body field"]:
     here = global_state(**{name: state[:, i] for i, name in enumerate(FIELDS)})
     # a nominal toy has no noise, so its key does not matter
-    return toy.observe(toy.step(toy.from_global(here), actions, jax.random.key(0))).select(FIELDS)
+    return toy.observe(toy.step(toy.begin(here), actions, jax.random.key(0))).select(FIELDS)

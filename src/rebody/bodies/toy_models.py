@@ -4,17 +4,19 @@ from pathlib import Path
 
 import mujoco
 
-from rebody.bodies.toys import FullToy, MassDamper, PositionToy, Toy
+from rebody.bodies.toys import MassDamper, PositionToy, SpaceToy, Toy
 from rebody.types import DECISION_DT
 
 _MODELS = Path(__file__).parent / "models"
 
 
 def toy_model(toy: Toy) -> mujoco.MjModel:
-    """A model whose time step is one decision of this toy; its joints are x, and of a full toy z and pitch."""
+    """A model whose time step is one decision of this toy, with a joint for each of its axes; its controls are the
+    toy's action. TypeError for a toy without a model.
+    """
     match toy:
-        case FullToy():
-            return full_toy_model(toy)
+        case SpaceToy():
+            return space_toy_model(toy)
         case MassDamper():
             return mass_damper_model(toy)
         case PositionToy():
@@ -23,7 +25,7 @@ def toy_model(toy: Toy) -> mujoco.MjModel:
 
 
 def mass_damper_model(toy: MassDamper) -> mujoco.MjModel:
-    """A model whose time step is one decision of this toy; its control is the toy's action."""
+    """On a rail along x."""
     spec = mujoco.MjSpec.from_file(str(_MODELS / "mass_damper.xml"))
     spec.geom("mass").mass = toy.mass
     spec.joint("x").damping[0] = toy.damping
@@ -31,22 +33,28 @@ def mass_damper_model(toy: MassDamper) -> mujoco.MjModel:
     return spec.compile()
 
 
-def full_toy_model(toy: FullToy) -> mujoco.MjModel:
-    """A model whose time step is one decision of this toy; its controls are its action, without lift in the air."""
-    spec = mujoco.MjSpec.from_file(str(_MODELS / "full_toy.xml"))
+def space_toy_model(toy: SpaceToy) -> mujoco.MjModel:
+    """A box with a nose, without the joints that are held; its lift is for the floor, 0 in the air."""
+    if toy.turns_first:
+        raise TypeError("a toy that turns first has no model: its forces are along its heading")
+    spec = mujoco.MjSpec.from_file(str(_MODELS / "space_toy.xml"))
     spec.option.gravity[2] = -toy.gravity
     body = spec.body("mass")
     body.mass, body.inertia = toy.mass, [toy.inertia] * 3
-    spec.joint("x").damping[0] = toy.damping
-    pitch = spec.joint("pitch")
-    pitch.damping[0], pitch.stiffness[0] = toy.turn_damping, toy.stiffness
-    for name, gear in (("force", toy.max_force), ("lift", toy.max_lift), ("torque", toy.max_torque)):
-        spec.actuator(name).gear[0] = gear
+    for axis in ("x", "y"):
+        spec.joint(axis).damping[0], spec.actuator(axis).gear[0] = toy.damping, toy.max_force
+    for axis in ("pitch", "yaw"):
+        spec.joint(axis).damping[0], spec.actuator(axis).gear[0] = toy.turn_damping, toy.max_torque
+    spec.joint("pitch").stiffness[0] = toy.stiffness
+    spec.actuator("z").gear[0] = toy.max_lift
+    for axis in toy.held:
+        spec.delete(spec.actuator(axis))
+        spec.delete(spec.joint(axis))
     return spec.compile()
 
 
 def position_toy_model(toy: PositionToy) -> mujoco.MjModel:
-    """A model whose time step is one decision of this toy; its control is the toy's action."""
+    """A servo on the speed along x."""
     spec = mujoco.MjSpec.from_file(str(_MODELS / "position_toy.xml"))
     step = spec.actuator("step")
     servo_gain = -step.biasprm[2]

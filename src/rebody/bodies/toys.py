@@ -1,148 +1,93 @@
 """The point masses ("toys" in the thesis): arithmetic on arrays of any batch shape, nothing to simulate.
 
-One step is one decision. Disturbances make what the encoder sees resemble a robot (ripple, lag, gain)
-or follow the thesis' noise (6.4-6.5); both are off in a nominal toy.
+One step is one decision. A toy of a class moves along some of `AXES`; one of `SpaceToy` along all that are not held.
 """
 
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import asdict, replace
+from typing import Any, Literal
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float, PRNGKeyArray
+import numpy as np
+from jaxtyping import Bool, Float, PRNGKeyArray
 
+from rebody.bodies.attitude import wrap_angle
+from rebody.bodies.disturbance import Disturbance, no_disturbance
 from rebody.errors import unknown
 from rebody.ranges import NotNegative, Positive
 from rebody.types import DECISION_DT, AnyArray, GlobalState, global_state
 
+Axis = Literal["x", "y", "z", "pitch", "yaw"]
+AXES: tuple[Axis, ...] = ("x", "y", "z", "pitch", "yaw")
+"""That a toy may move along, in the order of its action's numbers."""
+RATES = ("vx", "vy", "vz", "pitch_rate", "yaw_rate")
+X, Y, Z, PITCH, YAW = range(5)
 
-class Disturbance(eqx.Module):
-    """How one episode's toy departs from the nominal one."""
-
-    ripple_amplitude: Float[AnyArray, "*batch"]  # m/s, of a sine on the velocity, as a gait has
-    ripple_period: Float[AnyArray, "*batch"]  # s
-    ripple_phase: Float[AnyArray, "*batch"]  # rad
-    pitch_ripple: Float[AnyArray, "*batch"]  # rad/s, amplitude of the same sine on the pitch rate
-    lag: Float[AnyArray, "*batch"]  # s, time constant between action and force
-    gain: Float[AnyArray, "*batch"]  # share of the force that arrives
-    state_noise: Float[AnyArray, "*batch"]  # std of the noise on x [m] and v [m/s] at each step
-
-
-def no_disturbance(shape: tuple[int, ...]) -> Disturbance:
-    """The nominal toy."""
-    zero, one = jnp.zeros(shape), jnp.ones(shape)
-    return Disturbance(zero, one, zero, zero, zero, one, zero)
-
-
-@dataclass(frozen=True)
-class Randomisation:
-    """Ranges from which each episode's disturbance is drawn uniformly."""
-
-    ripple_amplitude: NotNegative = 0.6
-    """Largest amplitude of the ripple on the velocity [m/s]."""
-    ripple_period: tuple[Positive, Positive] = (0.2, 0.8)
-    """Shortest and longest period of the ripple [s]."""
-    pitch_ripple: NotNegative = 1.0
-    """Largest amplitude of the ripple on the pitch rate, where a toy has pitch [rad/s]."""
-    lag: NotNegative = 0.5
-    """Largest time constant of the force [s]."""
-    gain: tuple[NotNegative, NotNegative] = (0.5, 1.0)
-    """Smallest and largest share of the force that arrives."""
-    state_noise: NotNegative = 0.0
-    """Variance of the noise added to position and velocity at every step (thesis 6.4-6.5)."""
-
-    def sample(self, key: PRNGKeyArray, shape: tuple[int, ...]) -> Disturbance:
-        """One disturbance per episode."""
-        keys = jax.random.split(key, 6)
-        return Disturbance(
-            ripple_amplitude=jax.random.uniform(keys[0], shape, maxval=self.ripple_amplitude),
-            ripple_period=_between(keys[1], shape, self.ripple_period),
-            ripple_phase=jax.random.uniform(keys[2], shape, maxval=2 * jnp.pi),
-            pitch_ripple=jax.random.uniform(keys[5], shape, maxval=self.pitch_ripple),
-            lag=jax.random.uniform(keys[3], shape, maxval=self.lag),
-            gain=_between(keys[4], shape, self.gain),
-            state_noise=jnp.full(shape, self.state_noise**0.5),
-        )
-
-
-def _between(key: PRNGKeyArray, shape: tuple[int, ...], bounds: tuple[float, float]) -> Float[AnyArray, "*batch"]:
-    return jax.random.uniform(key, shape, minval=bounds[0], maxval=bounds[1])
+OfAxes = Float[AnyArray, "*batch 5"]
+"""A number for each of `AXES`."""
 
 
 class ToyState(eqx.Module):
-    """Where a toy is; velocities are means over the last step, ripple included.
+    """Where a toy is, axis by axis; velocities are means over the last step, ripple included."""
 
-    Only the full toy has z and pitch; elsewhere they stay 0.
-    """
-
-    x: Float[AnyArray, "*batch"]  # m
-    vx: Float[AnyArray, "*batch"]  # m/s, displacement over the last step divided by its duration
-    z: Float[AnyArray, "*batch"]  # m, above the floor
-    vz: Float[AnyArray, "*batch"]  # m/s
-    pitch: Float[AnyArray, "*batch"]  # rad
-    pitch_rate: Float[AnyArray, "*batch"]  # rad/s
-    drift: Float[AnyArray, "*batch"]  # m/s, velocity along x without the ripple: what the dynamics act on
-    turn: Float[AnyArray, "*batch"]  # rad/s, pitch rate without the ripple
-    force: Float[AnyArray, "*batch"]  # N, behind the action where there is a lag
-    torque: Float[AnyArray, "*batch"]  # N m, likewise
+    position: OfAxes  # m, rad; z above the floor
+    velocity: OfAxes  # m/s, rad/s: displacement over the last step divided by its duration
+    drift: OfAxes  # velocity without the ripple: what the dynamics act on
+    force: OfAxes  # N, N m, behind the action where there is a lag
     time: Float[AnyArray, "*batch"]  # s
     disturbance: Disturbance
 
 
 class Toy(eqx.Module):
-    """A point mass that moves along x."""
+    """A point mass."""
+
+    @property
+    @abstractmethod
+    def axes(self) -> tuple[Axis, ...]:
+        """What it moves along; along all others it stays at 0."""
 
     @property
     def actions(self) -> int:
         """Numbers in an action."""
-        return 1
+        return len(self.axes)
 
     @property
     def max_pitch(self) -> float:
         """Largest pitch that it can hold [rad]."""
         return 0.0
 
+    @property
+    def moves(self) -> Bool[np.ndarray, " 5"]:
+        """Whether it moves along each of `AXES`."""
+        return np.array([axis in self.axes for axis in AXES])
+
     @abstractmethod
     def step(self, state: ToyState, action: Float[AnyArray, "*batch action"], key: PRNGKeyArray) -> ToyState:
         """One decision with an action in [-1, 1]; the key feeds the noise."""
 
-    def initial(
-        self,
-        x: Float[AnyArray, "*batch"],
-        vx: Float[AnyArray, "*batch"],
-        disturbance: Disturbance | None = None,
-        pitch: Float[AnyArray, "*batch"] | float = 0.0,
-    ) -> ToyState:
-        """A toy at x [m] moving at vx [m/s], at a pitch [rad]; nominal unless a disturbance is given."""
-        x, vx = jnp.asarray(x, jnp.float32), jnp.asarray(vx, jnp.float32)
-        still = jnp.zeros_like(x)
-        return ToyState(
-            x=x,
-            vx=vx,
-            z=still,
-            vz=still,
-            pitch=jnp.broadcast_to(jnp.asarray(pitch, jnp.float32), x.shape),
-            pitch_rate=still,
-            drift=vx,
-            turn=still,
-            force=still,
-            torque=still,
-            time=still,
-            disturbance=disturbance or no_disturbance(x.shape),
-        )
-
     def observe(self, state: ToyState) -> GlobalState:
-        """The global state; y never moves."""
-        return global_state(
-            x=state.x, z=state.z, pitch=state.pitch, vx=state.vx, vz=state.vz, pitch_rate=state.pitch_rate
-        )
+        """The global state; roll never moves."""
+        fields = dict(zip(AXES, jnp.moveaxis(state.position, -1, 0), strict=True))
+        fields["yaw"] = wrap_angle(fields["yaw"])
+        return global_state(**fields, **dict(zip(RATES, jnp.moveaxis(state.velocity, -1, 0), strict=True)))
 
-    def from_global(self, state: GlobalState) -> ToyState:
-        """The nominal toy in the place of any body: where imagination starts (thesis 5.6.2)."""
-        return self.initial(state.x, state.vx)
+    def begin(self, state: GlobalState, disturbance: Disturbance | None = None) -> ToyState:
+        """A toy in the place of any body, as far as it can be (thesis 5.6.2); nominal unless a disturbance is given."""
+        position, velocity = (
+            jnp.where(self.moves, jnp.asarray(state.select(names), jnp.float32), 0.0) for names in (AXES, RATES)
+        )
+        shape = position.shape[:-1]
+        return ToyState(
+            position=position,
+            velocity=velocity,
+            drift=velocity,
+            force=jnp.zeros_like(position),
+            time=jnp.zeros(shape),
+            disturbance=no_disturbance(shape) if disturbance is None else disturbance,
+        )
 
     def imagine(
         self, state: GlobalState, act: Callable[[GlobalState], Float[AnyArray, "*batch action"]], decisions: int
@@ -154,7 +99,47 @@ class Toy(eqx.Module):
             body = self.step(body, act(self.observe(body)), key)
             return body, self.observe(body)
 
-        return jax.lax.scan(step, self.from_global(state), None, length=decisions)[1]
+        return jax.lax.scan(step, self.begin(state), None, length=decisions)[1]
+
+    def _wanted(self, action: Float[AnyArray, "*batch action"], largest: tuple[float, ...]) -> OfAxes:
+        """The action's shares of the largest along each axis."""
+        axes, still = self.axes, jnp.zeros_like(action[..., 0])
+        shares = [action[..., axes.index(axis)] if axis in axes else still for axis in AXES]
+        return jnp.asarray(largest) * jnp.clip(jnp.stack(shares, axis=-1), -1.0, 1.0)
+
+    def _moved(self, state: ToyState, drift: OfAxes, force: OfAxes, noise: OfAxes) -> ToyState:
+        """One decision on at a given velocity, the ripple added in position and velocity alike."""
+        time = state.time + DECISION_DT
+        ripple = self._from_heading(state, state.disturbance.ripple(time))
+        velocity = drift + jnp.where(self.moves, ripple, 0.0)
+        position = state.position + DECISION_DT * velocity + noise
+        return replace(state, position=position, velocity=velocity, drift=drift, force=force, time=time)
+
+    def _from_heading(self, state: ToyState, vector: OfAxes) -> OfAxes:
+        """What is along and across the heading as it is along x and y."""
+        return _turned(vector, state.position[..., YAW]) if "yaw" in self.axes else vector
+
+    def _noise(self, state: ToyState, key: PRNGKeyArray) -> Float[AnyArray, "2 *batch 5"]:
+        """On velocity and place, along x and y where it moves."""
+        felt = self.moves & (np.arange(len(AXES)) <= Y)
+        noise = jax.random.normal(key, (2, *state.position.shape))
+        return jnp.where(felt, state.disturbance.state_noise[..., None] * noise, 0.0)
+
+
+class PositionToy(Toy):
+    """x' = x + a with |a| <= max_step (thesis 6.1)."""
+
+    max_step: NotNegative = 0.1  # m
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """A line."""
+        return ("x",)
+
+    def step(self, state: ToyState, action: Float[AnyArray, "*batch action"], key: PRNGKeyArray) -> ToyState:
+        """The action is the share of the largest step."""
+        wanted = state.disturbance.gain[..., None] * self._wanted(action, (self.max_step,) * len(AXES))
+        return self._moved(state, wanted / DECISION_DT, state.force, self._noise(state, key)[1])
 
 
 class MassDamper(Toy):
@@ -168,33 +153,31 @@ class MassDamper(Toy):
     damping: NotNegative = 2.0  # N s/m
     max_force: NotNegative = 7.0  # N
 
-    def step(self, state: ToyState, action: Float[AnyArray, "*batch action"], key: PRNGKeyArray) -> ToyState:
-        """The action is the share of the largest force."""
-        disturbance = state.disturbance
-        noise = disturbance.state_noise * jax.random.normal(key, (2, *state.x.shape))
-        wanted = disturbance.gain * self.max_force * jnp.clip(action[..., 0], -1.0, 1.0)
-        force = _follow(state.force, wanted, disturbance.lag)
-        acceleration = (force - self.damping * state.drift) / self.mass
-        drift = state.drift + DECISION_DT * acceleration + noise[0]
-        return _move(state, drift, force, noise[1])
-
-
-class PositionToy(Toy):
-    """x' = x + a with |a| <= max_step (thesis 6.1)."""
-
-    max_step: NotNegative = 0.1  # m
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """A line."""
+        return ("x",)
 
     def step(self, state: ToyState, action: Float[AnyArray, "*batch action"], key: PRNGKeyArray) -> ToyState:
-        """The action is the share of the largest step."""
-        noise = state.disturbance.state_noise * jax.random.normal(key, state.x.shape)
-        wanted = state.disturbance.gain * self.max_step * jnp.clip(action[..., 0], -1.0, 1.0)
-        return _move(state, wanted / DECISION_DT, state.force, noise)
+        """The action is the share of the largest force along each axis."""
+        disturbance, noise = state.disturbance, self._noise(state, key)
+        wanted = disturbance.gain[..., None] * self._forced(state, action)
+        force = state.force + (wanted - state.force) * (DECISION_DT / (DECISION_DT + disturbance.lag))[..., None]
+        drift = state.drift + DECISION_DT * self._acceleration(state, force) + noise[0]
+        return self._moved(state, drift, force, noise[1])
+
+    def _forced(self, state: ToyState, action: Float[AnyArray, "*batch action"]) -> OfAxes:
+        return self._wanted(action, (self.max_force,) * len(AXES))
+
+    def _acceleration(self, state: ToyState, force: OfAxes) -> OfAxes:
+        return (force - self.damping * state.drift) / self.mass
 
 
-class FullToy(MassDamper):
-    """A mass-damper that can also jump off a floor and pitch (thesis B.1: three degrees of freedom).
+class SpaceToy(MassDamper):
+    """A mass-damper in space: it runs in the plane, jumps off a floor, pitches and turns (thesis B.1, and f_y of 6.6).
 
-    A spring rights it: it stands at up to max_torque / stiffness = 2.25 rad, and pitch never wraps.
+    A spring rights it: it pitches by up to max_torque / stiffness = 2.25 rad, and pitch never wraps. It turns by up to
+    max_torque / turn_damping = 2.25 rad/s.
     """
 
     gravity: NotNegative = 9.81  # m/s^2
@@ -203,69 +186,86 @@ class FullToy(MassDamper):
     stiffness: Positive = 4.0  # N m/rad
     turn_damping: NotNegative = 4.0  # N m s/rad
     max_torque: NotNegative = 9.0  # N m
+    held: tuple[Axis, ...] = eqx.field(static=True, default=())
+    """Axes that it does not move along."""
+    turns_first: bool = eqx.field(static=True, default=False)
+    """Whether nothing but a force along its heading moves it."""
 
     @property
-    def actions(self) -> int:
-        """Shares of the largest force, lift and torque."""
-        return 3
+    def axes(self) -> tuple[Axis, ...]:
+        """All that are not held."""
+        return tuple(axis for axis in AXES if axis not in self.held)
 
     @property
     def max_pitch(self) -> float:
         """Where the largest torque balances the spring [rad]."""
-        return self.max_torque / self.stiffness
+        return 0.0 if "pitch" in self.held else self.max_torque / self.stiffness
 
     def step(self, state: ToyState, action: Float[AnyArray, "*batch action"], key: PRNGKeyArray) -> ToyState:
-        """The floor lifts, never pulls, and only what stands on it."""
+        """The floor lifts, never pulls, and only what stands on it; lag and gain are not of a lift."""
         moved = super().step(state, action, key)
-        z, vz = self._lifted(state, action[..., 1])
-        turn, torque = self._turned(state, action[..., 2])
-        rate = turn + state.disturbance.pitch_ripple * _ripple(moved)
-        pitch = state.pitch + DECISION_DT * rate
-        return replace(moved, z=z, vz=vz, pitch=pitch, pitch_rate=rate, turn=turn, torque=torque)
+        if "z" in self.held:
+            return moved
+        z, vz = self._lifted(state, action[..., self.axes.index("z")])
+        upwards = (("position", z), ("velocity", vz), ("drift", vz))
+        return replace(moved, **{name: _with_z(getattr(moved, name), value) for name, value in upwards})
+
+    def _forced(self, state: ToyState, action: Float[AnyArray, "*batch action"]) -> OfAxes:
+        wanted = self._wanted(action, (self.max_force, self.max_force, 0.0, self.max_torque, self.max_torque))
+        if not self.turns_first:
+            return wanted
+        along = _turned(wanted, -state.position[..., YAW]) * (np.arange(len(AXES)) != Y)
+        return jnp.where(self.moves, self._from_heading(state, along), 0.0)
+
+    def _acceleration(self, state: ToyState, force: OfAxes) -> OfAxes:
+        inertia = jnp.asarray([self.mass, self.mass, self.mass, self.inertia, self.inertia])
+        damping = jnp.asarray([self.damping, self.damping, 0.0, self.turn_damping, self.turn_damping])
+        righting = state.position * jnp.asarray([0.0, 0.0, 0.0, self.stiffness, 0.0])
+        return (force - damping * state.drift - righting) / inertia
 
     def _lifted(self, state: ToyState, share: Float[AnyArray, "*batch"]):
-        lift = jnp.where(state.z <= 0, self.max_lift * jnp.clip(share, 0.0, 1.0), 0.0)
-        vz = jnp.where(state.z <= 0, jnp.maximum(state.vz, 0.0), state.vz)  # a fall ends on the floor
+        z, vz = state.position[..., Z], state.velocity[..., Z]
+        lift = jnp.where(z <= 0, self.max_lift * jnp.clip(share, 0.0, 1.0), 0.0)
+        vz = jnp.where(z <= 0, jnp.maximum(vz, 0.0), vz)  # a fall ends on the floor
         vz = vz + DECISION_DT * (lift / self.mass - self.gravity)
-        z = jnp.maximum(state.z + DECISION_DT * vz, 0.0)
-        return z, (z - state.z) / DECISION_DT
-
-    def _turned(self, state: ToyState, share: Float[AnyArray, "*batch"]):
-        wanted = state.disturbance.gain * self.max_torque * jnp.clip(share, -1.0, 1.0)
-        torque = _follow(state.torque, wanted, state.disturbance.lag)
-        righting = self.turn_damping * state.turn + self.stiffness * state.pitch
-        return state.turn + DECISION_DT * (torque - righting) / self.inertia, torque
-
-    def from_global(self, state: GlobalState) -> ToyState:
-        """The nominal toy at the same height and pitch."""
-        toy = self.initial(state.x, state.vx, pitch=state.pitch)
-        return replace(toy, z=state.z, vz=state.vz, pitch_rate=state.pitch_rate, turn=state.pitch_rate)
+        lifted = jnp.maximum(z + DECISION_DT * vz, 0.0)
+        return lifted, (lifted - z) / DECISION_DT
 
 
-def _follow(
-    value: Float[AnyArray, "*batch"], wanted: Float[AnyArray, "*batch"], lag: Float[AnyArray, "*batch"]
-) -> Float[AnyArray, "*batch"]:
-    """One decision of a first-order lag [s]."""
-    return value + (wanted - value) * DECISION_DT / (DECISION_DT + lag)
+class FullToy(SpaceToy):
+    """One that jumps and pitches on a line (thesis B.1: three degrees of freedom)."""
+
+    held: tuple[Axis, ...] = eqx.field(static=True, default=("y", "yaw"))
 
 
-def _move(state: ToyState, drift, force, position_noise) -> ToyState:
-    """Advance by one decision at a given velocity, the ripple added in position and velocity alike."""
-    moved = replace(state, drift=drift, force=force, time=state.time + DECISION_DT)
-    vx = drift + state.disturbance.ripple_amplitude * _ripple(moved)
-    return replace(moved, x=state.x + DECISION_DT * vx + position_noise, vx=vx)
+class PlaneToy(SpaceToy):
+    """One that runs and turns in the plane."""
+
+    held: tuple[Axis, ...] = eqx.field(static=True, default=("z", "pitch"))
 
 
-def _ripple(state: ToyState) -> Float[AnyArray, "*batch"]:
-    """The sine of a gait, now."""
-    disturbance = state.disturbance
-    return jnp.sin(2 * jnp.pi * state.time / disturbance.ripple_period + disturbance.ripple_phase)
+def _turned(vector: OfAxes, angle: Float[AnyArray, "*batch"]) -> OfAxes:
+    """The same with x and y turned about the vertical."""
+    cos, sin = jnp.cos(angle), jnp.sin(angle)
+    x, y = vector[..., X], vector[..., Y]
+    plane = jnp.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+    return jnp.concatenate([plane, vector[..., Z:]], axis=-1)
 
 
-TOYS: dict[str, type[Toy]] = {"mass-damper": MassDamper, "position": PositionToy, "full": FullToy}
+def _with_z(vector: OfAxes, z: Float[AnyArray, "*batch"]) -> OfAxes:
+    return jnp.where(np.arange(len(AXES)) == Z, z[..., None], vector)
 
 
-def make_toy(kind: str, **settings: float) -> Toy:
+TOYS: dict[str, type[Toy]] = {
+    "mass-damper": MassDamper,
+    "position": PositionToy,
+    "full": FullToy,
+    "plane": PlaneToy,
+    "space": SpaceToy,
+}
+
+
+def make_toy(kind: str, **settings: Any) -> Toy:
     """A toy by its name in `TOYS`; RebodyError if there is none."""
     if kind not in TOYS:
         raise unknown("toy", kind, TOYS)

@@ -2,6 +2,7 @@
 
 from rebody.tasks.family_set import FamilySet
 from rebody.tasks.line import LINE
+from rebody.tasks.plane import PLANE
 
-SHIPPED = FamilySet((*LINE,))
+SHIPPED = FamilySet((*LINE, *PLANE))
 """What a name means where no module and no file says otherwise."""

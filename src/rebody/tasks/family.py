@@ -95,8 +95,9 @@ class Family:
     @property
     def range(self) -> Box:
         """Between which ends all targets lie."""
-        low = tuple(map(min, zip(*(box.low for box in self.targets), strict=True)))
-        high = tuple(map(max, zip(*(box.high for box in self.targets), strict=True)))
+        boxes = [box.around for box in self.targets]
+        low = tuple(map(min, zip(*(box.low for box in boxes), strict=True)))
+        high = tuple(map(max, zip(*(box.high for box in boxes), strict=True)))
         return Box(low, high)
 
     @property

@@ -170,17 +170,19 @@ def fit(vector: Any, size: int) -> Any:
 def sample(families: FamilySet, key: PRNGKeyArray, shape: tuple[int, ...]) -> Task:
     """Tasks of a batch shape: the base task uniformly (thesis 6.2), then its target uniformly (6.3)."""
     which_key, where_key = jax.random.split(key)
-    family, low, high = _base_tasks(families)
+    family, low, high, polar = _base_tasks(families)
     which = jax.random.randint(which_key, shape, 0, len(family))
     share = jax.random.uniform(where_key, (*shape, families.size))
-    return Task(jnp.asarray(family)[which], jnp.asarray(low)[which] + jnp.asarray(high - low)[which] * share)
+    drawn = jnp.asarray(low)[which] + jnp.asarray(high - low)[which] * share
+    return Task(jnp.asarray(family)[which], _cartesian(drawn, jnp.asarray(polar)[which], jnp) if polar.any() else drawn)
 
 
 def draw(families: FamilySet, rng: np.random.Generator) -> Task:
     """One task from NumPy's generator, which no setting of JAX changes."""
-    family, low, high = _base_tasks(families)
+    family, low, high, polar = _base_tasks(families)
     which = rng.integers(len(family))
-    return Task(np.asarray(family[which]), rng.uniform(low[which].astype(float), high[which].astype(float)))
+    drawn = rng.uniform(low[which].astype(float), high[which].astype(float))
+    return Task(np.asarray(family[which]), _cartesian(drawn, polar[which], np) if polar.any() else drawn)
 
 
 def sample_episodes(families: FamilySet, key: PRNGKeyArray, episodes: int, decisions: int, switch_share: float) -> Task:
@@ -194,14 +196,22 @@ def sample_episodes(families: FamilySet, key: PRNGKeyArray, episodes: int, decis
     return Task(family, jnp.where(has_switched[..., None], second.target, first.target))
 
 
-def _base_tasks(families: FamilySet) -> tuple[Int[np.ndarray, " base"], Float[np.ndarray, "base axis"], Any]:
-    """Family, and the smallest and largest target, of every base task."""
+def _cartesian(drawn: Any, polar: Any, xp: Any) -> Any:
+    """Vectors [*batch, axis] of which those that are polar are a length and a bearing."""
+    length, bearing = drawn[..., 0], drawn[..., 1]
+    plane = fit(xp.stack([length * xp.cos(bearing), length * xp.sin(bearing)], axis=-1), drawn.shape[-1])
+    return xp.where(polar[..., None], plane, drawn)
+
+
+def _base_tasks(families: FamilySet) -> tuple[Int[np.ndarray, " base"], Any, Any, Bool[np.ndarray, " base"]]:
+    """Family, the smallest and largest target, and whether these are polar, of every base task."""
     ranges = [(i, box) for i, family in enumerate(families) for box in family.targets]
     low, high = (
         np.stack([families.pad(np.asarray(getattr(box, end), np.float32)) for _, box in ranges])
         for end in ("low", "high")
     )
-    return np.array([i for i, _ in ranges], np.int32), low, high
+    polar = np.array([box.polar for _, box in ranges])
+    return np.array([i for i, _ in ranges], np.int32), low, high, polar
 
 
 def _padded(wraps: tuple[bool, ...], size: int) -> tuple[bool, ...]:

@@ -134,7 +134,7 @@ class FlatLearner(Learner[TaskInference]):
     def view(self) -> FlatView:
         """What the policy sees; x as a share of how far the module's tasks take a robot, where no places are said."""
         farthest = max(max(box.largest) for box in self.module.contract.families.ranges.values())
-        return FlatView(self.module.parts.high_level.view.places, farthest)
+        return FlatView(self.module.places, farthest)
 
     def measure(self, actor: Actor) -> dict[str, float]:
         """Final error of each family, return, share that fell."""

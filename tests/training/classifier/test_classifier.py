@@ -7,7 +7,7 @@ import pytest
 
 from rebody.agents.build import slot_chooser
 from rebody.agents.parts import load_inference, load_slots
-from rebody.bodies.toys import Randomisation
+from rebody.bodies.disturbance import Randomisation
 from rebody.cli.main import run
 from rebody.store import load_artifact, tree_hash
 from rebody.training.classifier import ClassifierConfig

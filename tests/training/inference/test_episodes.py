@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rebody.bodies.toys import FullToy, MassDamper, Randomisation, make_toy
+from rebody.bodies.disturbance import CALM
+from rebody.bodies.toys import FullToy, MassDamper, make_toy
 from rebody.ranges import interval
 from rebody.tasks import FamilySet
 from rebody.tasks.line import GOAL, STAND
@@ -88,7 +89,7 @@ def test_the_first_half_is_nominal_and_moves_by_its_actions(episodes, config):
 
 
 def test_on_the_position_toy_a_step_is_a_tenth_of_a_metre_at_most(config, state):
-    calm = replace(config, randomisation=Randomisation(0.0, lag=0.0, gain=(1.0, 1.0)), start=(12.0, 0.0))
+    calm = replace(config, randomisation=CALM, start=(12.0, 0.0))
     key = jax.random.key(4)
     moved = collect(state.module, state.sac.actor, make_toy("position"), calm, roles(8, True), key)
     np.testing.assert_allclose(np.diff(moved.state.x, axis=1), 0.1 * moved.action[..., 0], atol=1e-5)
@@ -231,7 +232,7 @@ def test_a_full_toy_starts_at_any_pitch_that_it_can_hold(standing):
 
 
 def test_observations_can_be_noisy(config, state):
-    calm = replace(config, episodes=100, decisions=20, randomisation=Randomisation(0.0, lag=0.0, gain=(1.0, 1.0)))
+    calm = replace(config, episodes=100, decisions=20, randomisation=CALM)
     noisy = replace(calm, observation_noise=0.04)
     clean, rough = (
         collect(state.module, state.sac.actor, TOY, c, roles(100, True), jax.random.key(3)) for c in (calm, noisy)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from rebody.agents.parts import module_places
-from rebody.bodies.toys import make_toy, no_disturbance
+from rebody.bodies.disturbance import no_disturbance
+from rebody.bodies.toys import make_toy
 from rebody.control.high_level import PolicyView
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
@@ -15,8 +16,15 @@ from rebody.tasks import SHIPPED
 from rebody.training.inference import PRESETS
 from rebody.training.inference.config import MixtureConfig
 
-MOVES = {"mass-damper": {"x", "vx"}, "position": {"x", "vx"}, "full": {"x", "z", "pitch", "vx", "vz", "pitch_rate"}}
-SHOWN_BY = {"goal": "x", "velocity": "x", "stand": "pitch", "jump": "vz"}
+MOVES = {
+    "mass-damper": {"x", "vx"},
+    "position": {"x", "vx"},
+    "full": {"x", "z", "pitch", "vx", "vz", "pitch_rate"},
+    "plane": {"x", "y", "yaw", "vx", "vy", "yaw_rate"},
+}
+SHOWN_BY = {
+    "goal": "x", "velocity": "x", "stand": "pitch", "jump": "vz", "place": "y", "velocity_xy": "vy", "heading": "yaw"
+}
 """The field without which a family's reward could not be understood."""
 
 
@@ -45,14 +53,14 @@ def test_tasks_can_be_done_by_the_toy(preset):
     assert set(preset.families.names) <= set(SHIPPED.names)
     for family, box in preset.families.ranges.items():
         assert box.low < box.high
-        (far,) = box.largest
-        if family == "velocity":
+        far = max(box.largest)
+        if family in ("velocity", "velocity_xy"):
             assert far <= toy.max_force / toy.damping
         if family == "stand":
             assert far < toy.max_pitch
         if family == "jump":  # off the floor within a decision
             assert far <= 0.1 * (toy.max_lift / toy.mass - toy.gravity)
-        if family == "goal":  # episodes begin on either side of every goal
+        if family in ("goal", "place"):  # episodes begin on either side of every goal
             assert far <= preset.start[0]
 
 
@@ -67,7 +75,7 @@ def test_noise_takes_the_place_of_all_disturbances(name, variance):
     noisy = PRESETS[f"goal-velocity-noise-{name}"]()
     assert noisy.observation_noise == variance
     drawn, nominal = noisy.randomisation.sample(jax.random.key(0), (50,)), no_disturbance((50,))
-    for part in ("ripple_amplitude", "pitch_ripple", "lag", "gain", "state_noise"):
+    for part in ("ripple_amplitude", "pitch_ripple", "across_ripple", "yaw_ripple", "lag", "gain", "state_noise"):
         np.testing.assert_array_equal(getattr(drawn, part), getattr(nominal, part))
     assert noisy.families == PRESETS["goal-velocity"]().families
 

@@ -16,13 +16,12 @@ from rebody.store import tree_hash
 from rebody.tasks.family_set import FamilySet
 from rebody.tasks.line import VELOCITY as SPEEDS
 from rebody.training.inference import train
-from rebody.training.inference.episodes import Episodes
+from rebody.training.inference.episodes import Episodes, with_tasks
 from rebody.training.inference.train import (
     latent_prior,
     sample_evidence,
     sample_transitions,
     trained_parts,
-    with_tasks,
 )
 from rebody.training.replay import store_group
 from rebody.types import Belief, GlobalState, Task
@@ -101,7 +100,7 @@ def test_many_windows_begin_with_their_episode(labelled, config):
 @pytest.mark.parametrize("stored", [1, 3])
 def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, config, stored):
     plain = replace(config, arrival=0.0, policy_scales=(1.0, 1.0))
-    batch = sample_transitions(labelled, stored, plain, plain.policy_view, jax.random.key(0))
+    batch = sample_transitions(labelled, stored, plain, jax.random.key(0))
     x, vx, *belief = np.asarray(batch.observation).T
     group, episode, time = unpack(x)
     assert set(group) == set(range(stored))
@@ -119,7 +118,7 @@ def test_transitions_come_from_nominal_episodes_with_their_beliefs(labelled, con
     assert not np.asarray(batch.terminal).any()
 
 
-def test_the_oracle_is_told_the_task_that_is_on_at_every_decision(labelled, config):
+def test_who_is_told_knows_the_task_that_is_on_at_every_decision(labelled, config):
     """In this replay, another one at every decision; the last one lasts."""
     told = with_tasks(labelled, TaskCode(places_of(config.families)))
     target = np.asarray(labelled.task.target)[..., 0] / 10.0
@@ -130,16 +129,6 @@ def test_the_oracle_is_told_the_task_that_is_on_at_every_decision(labelled, conf
     assert not np.asarray(told.belief.variance).any()
     for name in ("task", "state", "action", "reward"):
         assert tree_hash(getattr(told, name)) == tree_hash(getattr(labelled, name))
-
-    plain = replace(config, policy_scales=(1.0, 1.0))
-    batch = sample_transitions(told, 3, plain, plain.policy_view, jax.random.key(0))
-    group, episode, time = unpack(batch.observation[:, 0])
-    for observation, now in (
-        (batch.observation, time),
-        (batch.next_observation, np.minimum(time + 1, config.decisions - 1)),
-    ):
-        expected = [np.ones(300), target[group, episode, now], np.zeros(300), np.zeros(300)]
-        np.testing.assert_allclose(observation[:, 2:].T, expected, rtol=1e-6)
 
 
 @pytest.fixture(scope="module")
@@ -196,21 +185,17 @@ def test_a_mixture_is_kept_where_there_is_one(state, config):
     jax.tree.map(np.testing.assert_array_equal, kept, state.clusters.prior)
 
 
-def test_what_is_kept_are_the_averaged_policies(state, config):
-    marked = eqx.tree_at(
-        lambda s: (s.sac.averaged_actor.net.mlp.biases[-1], s.privileged.averaged_actor.net.mlp.biases[-1]),
-        state,
-        (jnp.full(2, 1.0), jnp.full(2, 2.0)),
-    )
+def test_what_is_kept_of_a_policy_that_explores_is_its_average(state, config):
+    marked = eqx.tree_at(lambda s: s.sac.averaged_actor.net.mlp.biases[-1], state, jnp.full(2, 1.0))
     parts = trained_parts(marked, config)
     assert tree_hash(parts.high_level.actor) == tree_hash(marked.sac.averaged_actor)
-    assert tree_hash(parts.told_policy.actor) == tree_hash(marked.privileged.averaged_actor)
+    assert tree_hash(parts.told_policy.actor) == tree_hash(marked.told.actor)
     assert tree_hash(parts.module) == tree_hash(state.module)
 
 
 def test_scales_divide_what_the_policy_sees(labelled, config):
     plain, scaled = (
-        sample_transitions(labelled, 3, config, replace(config.policy_view, scales=scales), jax.random.key(0))
+        sample_transitions(labelled, 3, replace(config, policy_scales=scales), jax.random.key(0))
         for scales in ((1.0, 1.0), (10.0, 3.5))
     )
     np.testing.assert_allclose(scaled.observation[:, :2] * np.array([10.0, 3.5]), plain.observation[:, :2], rtol=1e-5)
@@ -220,7 +205,7 @@ def test_arrival_is_paid_on_the_spot_and_half_of_it_at_ten_centimetres(labelled,
     paid = replace(config, arrival=0.4)
     for earned, extra in ((0.0, 0.4), (-0.1, 0.2), (-10.0, 0.4 * 0.1 / 10.1)):
         replay = eqx.tree_at(lambda e: e.reward, labelled, jnp.full_like(labelled.reward, earned))
-        batch = sample_transitions(replay, 3, paid, paid.policy_view, jax.random.key(0))
+        batch = sample_transitions(replay, 3, paid, jax.random.key(0))
         np.testing.assert_allclose(batch.reward, earned / 10.0 + extra, rtol=1e-5)
 
 
@@ -235,7 +220,7 @@ def test_the_newest_episodes_replace_the_oldest(labelled, config):
 
 
 def test_inference_is_frozen_while_the_policy_learns_on(pipelines, tmp_path, monkeypatch):
-    """One turn of wandering: inference alone. Two with all, the told policy among them. Then the policy alone."""
+    """One turn of wandering: all but the policy of beliefs. Two with all. Then that policy alone."""
     states, iterate = [], train.iterate
     monkeypatch.setattr(train, "iterate", lambda state, *rest: states.append(state) or iterate(state, *rest))
     assert pipelines["inference"](tmp_path / "run") == 0
@@ -247,6 +232,6 @@ def test_inference_is_frozen_while_the_policy_learns_on(pipelines, tmp_path, mon
     assert changed(lambda state: state.module.encoder) == [True, True, True, False, False]
     assert changed(lambda state: state.module.decoder.experts) == [True, True, True, False, False]
     assert changed(lambda state: state.sac.actor) == [False, True, True, True, True]
-    assert changed(lambda state: state.privileged.actor) == [False, True, True, False, False]
+    assert changed(lambda state: state.told.actor) == [True, True, True, False, False]
     assert changed(lambda state: state.clusters) == [False, True, True, False, False]
     assert changed(lambda state: state.replay.reward) == 5 * [True]

@@ -15,7 +15,7 @@ from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
 from rebody.ranges import interval
 from rebody.tasks import line
-from rebody.training.inference.train import with_tasks
+from rebody.training.inference.episodes import with_tasks
 from rebody.training.scratch import ScratchConfig
 from rebody.training.scratch.train import collect, initial_state, interpret, sample_steps
 from rebody.training.task_inference import begin_inference

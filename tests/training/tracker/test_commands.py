@@ -101,10 +101,10 @@ def test_a_guide_is_the_toy_stepped_as_often_as_it_is_ahead():
     np.testing.assert_array_equal(subgoal.slot, family)
 
     toy = MassDamper()
-    body, expected = toy.from_global(state), np.full(len(family), np.nan)
+    body, expected = toy.begin(state), np.full(len(family), np.nan)
     for ahead in range(1, 10):
         body = toy.step(body, _scripted_action(toy, body, family == GOAL, target), jax.random.key(0))
-        reached = np.where(family == GOAL, body.x, body.vx)
+        reached = np.where(family == GOAL, body.position[:, 0], body.velocity[:, 0])
         expected = np.where(horizon == ahead, reached, expected)
     np.testing.assert_allclose(subgoal.value[:, 0], expected, rtol=1e-5, atol=1e-6)
 

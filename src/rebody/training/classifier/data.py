@@ -1,6 +1,5 @@
 """Beliefs on the toy: what the classifier learns from, and what the slots of clusters are found on."""
 
-from dataclasses import fields
 
 import equinox as eqx
 import jax
@@ -8,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from rebody.agents.agent import Command, ReuseAgent
+from rebody.agents.agent import Agent, Command, ReuseAgent
 from rebody.agents.build import build_agent
 from rebody.agents.parts import Inference
 from rebody.agents.rollout import Episodes, rollout_on_toy
@@ -30,22 +29,24 @@ def act(module: Inference, tasks: Task, disturbance: Disturbance) -> Episodes:
     return rollout_on_toy(agent, module.toy, tasks, module.contract.families, disturbance)
 
 
-class TrackingToy(ReuseAgent):
+class TrackingToy(Agent):
     """`reuse` with a tracker for the toy: the held action whose outcome is nearest to the subgoal.
 
     So it shows what a slot is worth, as a robot with a tracker would, and costs no robot.
     """
 
+    reuse: ReuseAgent
+
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """The subgoal of the slot, and the action that brings it about."""
-        subgoal = super().command(state, belief, decision).subgoal
-        families, actions = self.families, self.toy.actions
+        subgoal = self.reuse.command(state, belief, decision).subgoal
+        families, toy, actions = self.families, self.reuse.toy, self.reuse.toy.actions
         steps = jnp.linspace(-1.0, 1.0, 41)
         candidates = jnp.concatenate([steps[:, None] * jnp.eye(actions)[i] for i in range(actions)])
 
         def outcome(action: Float[AnyArray, " action"]) -> Float[AnyArray, "*batch"]:
             held = jnp.broadcast_to(action, (*state.x.shape, actions))
-            states = self.toy.imagine(state, lambda _: held, HOLD)
+            states = toy.imagine(state, lambda _: held, HOLD)
             reached = families.achieved_by_way_of(subgoal.slot, states)
             return length(families.difference(subgoal.slot, reached, subgoal.value))
 
@@ -65,7 +66,8 @@ def slots_of_clusters(module: Inference, tasks: Task, disturbance: Disturbance) 
 def _earned(module: Inference, mixture: MixturePrior, slot: int, tasks: Task, disturbance: Disturbance):
     """Mean reward of the decisions in which each component was believed, all subgoals in one slot."""
     reuse = build_agent("reuse", module, slots=OneSlot(slot))  # as far ahead as on a robot
-    tracking = TrackingToy(**{field.name: getattr(reuse, field.name) for field in fields(reuse)})
+    assert isinstance(reuse, ReuseAgent)
+    tracking = TrackingToy(reuse.inferrer, reuse.reader, reuse.families, reuse.stride, reuse)
     episodes = rollout_on_toy(tracking, module.toy, tasks, module.contract.families, disturbance)
     believed = eqx.filter_jit(mixture.component)(episodes.belief.mean)[KNOWN_FROM - 1 : -1]
     is_component = np.asarray(believed)[..., None] == np.arange(len(mixture.active))

@@ -6,14 +6,30 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from rebody.agents.parts import module_places, told_view
-from rebody.bodies.toys import Randomisation
+from rebody.bodies.disturbance import Randomisation
 from rebody.control.high_level import PolicyView
 from rebody.control.sac import SACConfig
 from rebody.errors import RebodyError
 from rebody.inference import InferenceConfig
 from rebody.inference.mixture.settings import MixtureConfig
-from rebody.ranges import Copies, Count, Decisions, Episodes, NotNegative, Number, Positive, Share
+from rebody.ranges import Copies, Count, Decisions, Episodes, NotNegative, Number, Positive, Rate, Share
 from rebody.tasks import FamilySet
+
+
+@dataclass(frozen=True)
+class ToldConfig:
+    """How the policy that is told its task learns: by gradients through the toy."""
+
+    updates: Number = 64
+    """Updates in an iteration, until inference is frozen."""
+    courses: Copies = 64
+    """Toys that move in parallel."""
+    decisions: Decisions = 24
+    """Length of their courses: longer than it takes to brake."""
+    near: Share = 0.5
+    """Share of the courses that begin within a family's floor of their target, for the last centimetres."""
+    learning_rate: Rate = 2e-3
+    """Adam's step size at the start; a cosine takes it to a fiftieth."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +46,16 @@ class MetaConfig:
     """Fields of the global state that the policies see, beside the places that a split latent speaks of."""
     policy_scales: tuple[Positive, ...]
     """What each of them is divided by [m, m/s]."""
+    acts_by: Literal["belief", "task"] = "belief"
+    """What the high-level policy goes by. By beliefs it learns to act while little is known, and as exactly as they
+    are; by tasks it is told what the likeliest one is, and needs sharp beliefs."""
+    told: ToldConfig = field(default_factory=ToldConfig)
+    """The learning of the policy that is told its task."""
     prior: Literal["gaussian", "mixture"] = "gaussian"
     """What the latent is drawn towards: one Gaussian, or a Dirichlet process mixture."""
     mixture: MixtureConfig = field(default_factory=MixtureConfig)
     """Settings of the mixture."""
-    toy: Literal["mass-damper", "position", "full"] = "mass-damper"
+    toy: Literal["mass-damper", "position", "full", "plane", "space"] = "mass-damper"
     """The body that everything is learned on."""
     arrival: NotNegative = 0.0
     """Added to the scaled reward r / reward_scale of the policy's learning when r = 0. It is a function of the reward
@@ -48,9 +69,12 @@ class MetaConfig:
     observation_noise: NotNegative = 0.0
     """Variance of the noise on every observed field (thesis, captions of 6.20)."""
     start: tuple[NotNegative, NotNegative] = (12.0, 3.0)
-    """Episodes start at uniformly random x [m] and vx [m/s] within these, a full toy at any pitch that it can hold."""
+    """Episodes start at uniformly random places [m] and velocities [m/s] within these along every axis, at any pitch
+    that a toy can hold, and at any heading where it turns."""
     disturbed_start: tuple[NotNegative, NotNegative] | None = None
     """The same for disturbed episodes, which teach inference alone; by default as the others."""
+    home_share: Share = 0.0
+    """Share of episodes that start at home and at rest, as a robot does."""
     turn_probability: Share = 0.15
     """Chance per decision that a wandering toy changes its mind. It must come to see goals from both sides: while it
     stays on one, a belief in their mirror image explains all that it hears."""
@@ -63,7 +87,7 @@ class MetaConfig:
     wander_iterations: Number = 12
     """Iterations at the start in which all toys wander and only inference learns."""
     joint_iterations: Number = 38
-    """Iterations after that in which inference, the policy, and one that is told the task learn together."""
+    """Iterations after that in which inference and the policy learn together."""
     policy_iterations: Number = 90
     """Iterations after that in which inference is frozen and the policy learns on."""
     evaluate_every: Count = 10
@@ -79,7 +103,7 @@ class MetaConfig:
     inference_updates: Number = 128
     """Updates of encoder and decoder in an iteration."""
     policy_updates: Number = 512
-    """Updates of the policy in an iteration, and of the policy that is told the task in joint ones."""
+    """Updates of the policy that goes by beliefs in an iteration."""
 
     def __post_init__(self):
         """RebodyError where a field has no scale, a scale no field, or no window fits into an episode."""

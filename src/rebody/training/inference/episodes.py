@@ -1,6 +1,8 @@
 """Collecting episodes on the toy, and what is kept of them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -8,14 +10,16 @@ import jax.numpy as jnp
 from jaxtyping import Bool, Float, PRNGKeyArray
 
 from rebody.agents.configs import understood
-from rebody.bodies.toys import Randomisation, Toy, ToyState, no_disturbance
+from rebody.bodies.disturbance import Randomisation, no_disturbance
+from rebody.bodies.toys import Toy, ToyState
 from rebody.control.sac import Actor
+from rebody.control.places import TaskCode, places_of
 from rebody.inference import Encoder, InferenceModule
 from rebody.store import Artifact
 from rebody.tasks import FamilySet
 from rebody.tasks.family_set import sample_episodes
 from rebody.training.inference.config import MetaConfig
-from rebody.types import AnyArray, Belief, GlobalState, Task, Transition
+from rebody.types import AnyArray, Belief, GlobalState, Task, Transition, global_state
 
 
 @dataclass(frozen=True)
@@ -41,21 +45,32 @@ class ToyWorld:
         return jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), tasks), disturbance
 
 
+FINDS_OUT = 0.4
+"""Share of an episode within which a policy that is told tasks learns of its own."""
+
+
 class Roles(eqx.Module):
     """How each episode's toy acts; where neither holds it samples its policy."""
 
     wanders: Bool[AnyArray, " episode"]  # holds random actions, to show the encoder what a policy would not
     decides: Bool[AnyArray, " episode"]  # takes the most likely action, as it will when it is used
+    strays: Bool[AnyArray, " episode"]  # goes by a task that it is not paid for, where policies are told tasks
 
 
-def roles(episodes: int, all_wander: bool) -> Roles:
-    """A quarter of the episodes decides, a quarter wanders; all wander at first.
+def roles(episodes: int, all_wander: bool, acts_by: str = "belief") -> Roles:
+    """A quarter of the episodes decides, a quarter wanders; all wander at first. Where a policy is told tasks, another
+    quarter decides, too, and every second episode strays.
 
     A toy that only ever sampled would keep moving by chance. Standing still beside its goal, where a window
     soon forgets on which side it lies, would then be new to encoder and policy when they are used.
     """
     quarter = jnp.arange(episodes) * 4 // episodes
-    return Roles(wanders=(quarter == 3) | all_wander, decides=quarter == 0)
+    is_told = acts_by == "task"
+    return Roles(
+        wanders=(quarter == 3) | all_wander,
+        decides=(quarter == 0) | ((quarter == 2) & is_told),
+        strays=(jnp.arange(episodes) % 2 == 1) & is_told,
+    )
 
 
 class Episodes(eqx.Module):
@@ -76,21 +91,21 @@ def collect(
 
     The belief is always built from the running episode alone, never from stored ones.
     """
-    task_key, start_key, observe_key, held_key, walk_key = jax.random.split(key, 5)
+    task_key, start_key, observe_key, held_key, walk_key, known_key = jax.random.split(key, 6)
     shape = (config.episodes,)
     families = config.families
     task = sample_episodes(families, task_key, config.episodes, config.decisions, config.switch_share)
     body = _random_start(toy, config, start_key)
     seen = _observe(toy, body, config, observe_key)
-    encoder, interpret = module.encoder, module.decoder.interpret
+    encoder, observed = module.encoder, _observer(module, config)
     belief = encoder.prior(shape)
     held = jax.random.uniform(held_key, (*shape, toy.actions), minval=-1.0)
 
     def decide(walk, inputs):
-        task, key = inputs
+        task, known, key = inputs
         body, seen, carry, belief, held = walk
         action_key, step_key, noise_key, wander_key = jax.random.split(key, 4)
-        observation = config.policy_view(seen, interpret(belief))
+        observation = observed(seen, belief, known)
         sampled, _ = actor.sample(observation, action_key)
         held = _wander(held, config.turn_probability, wander_key)
         action = jnp.where(roles.decides[:, None], actor(observation), sampled)
@@ -103,10 +118,33 @@ def collect(
 
     walk = (body, seen, encoder.initial(shape), belief, held)
     keys = jax.random.split(walk_key, config.decisions)
-    active = jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), task)
-    _, (states, beliefs, actions, rewards) = jax.lax.scan(decide, walk, (active, keys))
+    known = _known(task, roles, config, known_key)
+    active, known = jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), (task, known))
+    _, (states, beliefs, actions, rewards) = jax.lax.scan(decide, walk, (active, known, keys))
     along = (_prepend(seen, states), _prepend(belief, beliefs), actions, rewards)
     return Episodes(task, *jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), along))
+
+
+def _observer(module: InferenceModule, config: MetaConfig) -> Callable[[GlobalState, Belief, Task], Any]:
+    """What the acting policy sees of a state, a belief and the task that it knows of."""
+    if config.acts_by == "belief":
+        return lambda seen, belief, known: config.policy_view(seen, module.decoder.interpret(belief))
+    code = TaskCode(places_of(config.families))
+    return lambda seen, belief, known: config.told_view(seen, code(known))
+
+
+def _known(task: Task, roles: Roles, config: MetaConfig, key: PRNGKeyArray) -> Task:
+    """The tasks that a policy goes by which is told them: at first, and where it strays to the end, other ones.
+
+    Who went for a target that it cannot know of yet would tell the encoder where it is.
+    """
+    other_key, when_key = jax.random.split(key)
+    other = sample_episodes(config.families, other_key, config.episodes, config.decisions, 1.0)
+    latest = jnp.where(roles.strays, config.decisions, FINDS_OUT * config.decisions)
+    begins = jax.random.uniform(when_key, latest.shape, minval=jnp.where(roles.strays, 1.0, 0.05)) * latest
+    knows = jnp.arange(config.decisions) >= begins[:, None]
+    family = jnp.where(knows, task.family, other.family)
+    return Task(family, jnp.where(knows[..., None], task.target, other.target))
 
 
 @eqx.filter_jit
@@ -126,20 +164,35 @@ def refresh_beliefs(encoder: Encoder, episodes: Episodes, first: int) -> Episode
     return eqx.tree_at(lambda e: e.belief, episodes, beliefs)
 
 
+def with_tasks(episodes: Episodes, code: TaskCode) -> Episodes:
+    """The same episodes with the truth in place of what was believed; the last task lasts beyond the end."""
+    time = episodes.task.family.ndim - 1
+    active = jax.tree.map(lambda leaf: _with_last(leaf, time), episodes.task)
+    return eqx.tree_at(lambda e: e.belief, episodes, code(active))
+
+
+def _with_last(leaf: AnyArray, axis: int) -> jax.Array:
+    """The last entry along an axis twice."""
+    last = jax.lax.slice_in_dim(leaf, -1, None, axis=axis)
+    return jnp.concatenate([leaf, last], axis=axis)
+
+
 def _random_start(toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> ToyState:
     """Anywhere, at any speed, so that the latent cannot take the start for the task."""
-    where_key, disturbance_key = jax.random.split(key)
+    where_key, disturbance_key, home_key = jax.random.split(key, 3)
     shape = (config.episodes,)
     nominal = jnp.arange(config.episodes) < config.episodes // 2
     starts = config.start, config.disturbed_start or config.start
-    near, far = (jnp.asarray([*start, toy.max_pitch])[:, None] for start in starts)
-    x, vx, pitch = jax.random.uniform(where_key, (3, *shape), minval=-1.0) * jnp.where(nominal, near, far)
+    near, far = (jnp.asarray([x, vx, toy.max_pitch, x, vx, jnp.pi])[:, None] for x, vx in starts)
+    away = ~jax.random.bernoulli(home_key, config.home_share, shape)
+    drawn = jax.random.uniform(where_key, (6, *shape), minval=-1.0) * jnp.where(nominal, near, far) * away
+    at = global_state(**dict(zip(("x", "vx", "pitch", "y", "vy", "yaw"), drawn, strict=True)))
     disturbance = jax.tree.map(
         lambda calm, rough: jnp.where(nominal, calm, rough),
         no_disturbance(shape),
         config.randomisation.sample(disturbance_key, shape),
     )
-    return toy.initial(x, vx, disturbance, pitch)
+    return toy.begin(at, disturbance)
 
 
 def _wander(

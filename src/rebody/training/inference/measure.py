@@ -13,6 +13,7 @@ from rebody.agents.rollout import Episodes, rollout_on_toy
 from rebody.bodies.toys import Toy
 from rebody.inference.contract import Contract
 from rebody.inference.probe import Probe, fit_probe
+from rebody.inference.reader import PlaceReader
 from rebody.tasks import Family, FamilySet
 from rebody.tasks.figures import Series
 from rebody.tasks.quantities import length
@@ -54,7 +55,7 @@ class Outcome:
 
 def measure(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
     """Final errors [m, m/s, rad], return and the oracle's, and how sharply beliefs read out."""
-    probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
+    probe, outcome = reader(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
     oracle = act("oracle", parts, toy, config, held_out)
     return outcome.figures | {"oracle return": oracle.total_return} | _readings(probe, outcome)
 
@@ -62,7 +63,7 @@ def measure(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) 
 def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
     """`measure`, and: the return with the exact posterior, sharpness on disturbed toys, changes of the task, and
     clusters where there is a mixture."""
-    probe, outcome = fit(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
+    probe, outcome = reader(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
     figures = outcome.figures
     for kind in ("bayes", "oracle"):
         figures[f"{kind} return"] = act(kind, parts, toy, config, held_out).total_return
@@ -88,7 +89,7 @@ def act(
     world = ToyWorld(config.families, config.randomisation)
     tasks, disturbance = world.draw(key, held_out, decisions, switch_share, disturbed=disturbed)
     inference = Inference("in training", contract_of(config), parts, toy)
-    agent = build_agent(kind, inference, tasks, horizon=1)
+    agent = build_agent(kind, inference, tasks, horizon=1, sharpen=config.acts_by == "task")
     episodes = rollout_on_toy(agent, toy, tasks, config.families, disturbance)
     return Outcome(config.families, *jax.tree.map(np.asarray, (tasks, episodes)))
 
@@ -100,6 +101,13 @@ def contract_of(config: MetaConfig) -> Contract:
         window=config.inference.window,
         families=config.families,
     )
+
+
+def reader(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> Probe | PlaceReader:
+    """What reads the beliefs of `act`: those that a policy of tasks acts by say their places themselves."""
+    if config.acts_by == "task":
+        return PlaceReader(parts.module.decoder, config.families)
+    return fit(parts, toy, config, held_out)
 
 
 def fit(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int, *, disturbed: bool = False) -> Probe:
@@ -115,7 +123,7 @@ def probe_of(families: FamilySet, tasks: Task, episodes: Episodes) -> Probe:
     return fit_probe(families, latent.reshape(-1, latent.shape[-1]), family.ravel(), target.reshape(-1, families.size))
 
 
-def _readings(probe: Probe, outcome: Outcome) -> dict[str, float]:
+def _readings(probe: Probe | PlaceReader, outcome: Outcome) -> dict[str, float]:
     """Share of right base tasks, early and later on, and R^2 of each family's target."""
     right = is_right(probe, outcome)
     figures = {"base task": float(right[BASE_TASK_AT - 1].mean()), "base task later": float(right[PROBED_FROM:].mean())}
@@ -125,7 +133,7 @@ def _readings(probe: Probe, outcome: Outcome) -> dict[str, float]:
     return figures
 
 
-def _sharpness(probe: Probe, outcome: Outcome) -> dict[str, float]:
+def _sharpness(probe: Probe | PlaceReader, outcome: Outcome) -> dict[str, float]:
     """Median distance between the target that a disturbed toy's belief speaks of and the true one."""
     return {
         f"{family.name} read, disturbed": float(np.median(length(missed[SHARP_AT])))
@@ -133,7 +141,7 @@ def _sharpness(probe: Probe, outcome: Outcome) -> dict[str, float]:
     }
 
 
-def _changes(probe: Probe, outcome: Outcome) -> dict[str, float]:
+def _changes(probe: Probe | PlaceReader, outcome: Outcome) -> dict[str, float]:
     """Decisions until a new base task is read rightly (median; all that are left, where it never is), and how often a
     right reading is lost again."""
     label = outcome.families.base_task(outcome.tasks)
@@ -169,20 +177,20 @@ def _clusters(outcome: Outcome, config: MetaConfig) -> dict[str, float]:
 
 
 def read(
-    probe: Probe, outcome: Outcome
+    probe: Probe | PlaceReader, outcome: Outcome
 ) -> tuple[Int[np.ndarray, "time episode"], Float[np.ndarray, "time episode axis"]]:
     """Family and target that each belief speaks of."""
     family, target = probe(outcome.episodes.belief)
     return np.asarray(family), np.asarray(target)
 
 
-def is_right(probe: Probe, outcome: Outcome) -> Bool[np.ndarray, "time episode"]:
+def is_right(probe: Probe | PlaceReader, outcome: Outcome) -> Bool[np.ndarray, "time episode"]:
     """Whether family and direction are read rightly from each belief."""
     base_task = outcome.families.base_task
     return np.asarray(base_task(Task(*read(probe, outcome))) == base_task(outcome.tasks))
 
 
-def _by_family(probe: Probe, outcome: Outcome) -> Iterator[tuple[Family, Series, Series]]:
+def _by_family(probe: Probe | PlaceReader, outcome: Outcome) -> Iterator[tuple[Family, Series, Series]]:
     """Of each family: what its episodes' targets are read wrongly by, and the targets, [time, episode, size]."""
     _, target = read(probe, outcome)
     for i, family in enumerate(outcome.families):

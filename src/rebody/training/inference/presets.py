@@ -3,12 +3,13 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from rebody.bodies.toys import Randomisation
+from rebody.bodies.disturbance import CALM
 from rebody.control.high_level import high_level_sac
 from rebody.inference import InferenceConfig
 from rebody.ranges import interval
 from rebody.tasks import FamilySet
 from rebody.tasks.line import GOAL, JUMP, STAND, VELOCITY, both_ways
+from rebody.tasks.plane import PLANE
 from rebody.training.inference.config import MetaConfig
 
 
@@ -40,7 +41,7 @@ def position_thesis() -> MetaConfig:
         inference=replace(base.inference, latent=1),
         policy_fields=("x",),
         policy_scales=(10.0,),
-        randomisation=Randomisation(ripple_amplitude=0.0, lag=0.0, gain=(1.0, 1.0)),
+        randomisation=CALM,
         start=(12.0, 0.0),
         turn_probability=0.02,
     )
@@ -128,9 +129,31 @@ def goal_velocity_jump() -> MetaConfig:
     )
 
 
+def plane() -> MetaConfig:
+    """Reach a hidden place, move at a hidden velocity or face a hidden direction, all in the plane (thesis 6.6)."""
+    return replace(
+        goal_velocity(),
+        families=PLANE,
+        toy="plane",
+        inference=InferenceConfig(
+            fields=("x", "y", "vx", "vy", "yaw"),
+            scales=(10.0, 10.0, 2.0, 2.0, 1.0),
+            reward_scale=1.0,
+            latent=12,
+            kinds=3,
+        ),
+        policy_fields=("vx", "vy", "yaw_rate"),
+        policy_scales=(3.0, 3.0, 2.0),
+        start=(15.0, 2.0),
+        disturbed_start=None,
+        home_share=0.5,
+        acts_by="task",
+        wander_iterations=5,
+    )
+
+
 def _noisy(variance: float) -> MetaConfig:
-    calm = Randomisation(ripple_amplitude=0.0, pitch_ripple=0.0, lag=0.0, gain=(1.0, 1.0))
-    return replace(goal_velocity(), randomisation=calm, observation_noise=variance)
+    return replace(goal_velocity(), randomisation=CALM, observation_noise=variance)
 
 
 PRESETS: dict[str, Callable[[], MetaConfig]] = {
@@ -143,4 +166,5 @@ PRESETS: dict[str, Callable[[], MetaConfig]] = {
     "goal-velocity-noise-0.2": goal_velocity_noise_02,
     "goal-velocity-stand": goal_velocity_stand,
     "goal-velocity-jump": goal_velocity_jump,
+    "plane": plane,
 }

@@ -23,7 +23,9 @@ def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run
         contract=contract,
         inference=config.inference,
         mixture=config.mixture if config.prior == "mixture" else None,
-        high_level=ToyPolicySettings(view.fields, view.scales, config.sac.hidden, config.sac.projections),
+        high_level=ToyPolicySettings(
+            view.fields, view.scales, config.sac.hidden, config.sac.projections, config.acts_by
+        ),
         toy=describe_toy(toy),
         training=run.training(config),
     )

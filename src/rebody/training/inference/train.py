@@ -1,4 +1,4 @@
-"""Meta-training on the toy: collect -> update inference -> update policy -> evaluate.
+"""Meta-training on the toy: collect -> update inference -> update policies -> evaluate.
 
 The encoder learns from nominal and from disturbed episodes, since it will meet gait ripple and lag on a
 robot. The policy learns from the nominal ones alone: on a robot it runs in imagination only.
@@ -17,8 +17,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from rebody.agents.parts import InferenceParts, load_inference
 from rebody.bodies.toys import Toy, make_toy
 from rebody.control import sac
-from rebody.control.high_level import HighLevelPolicy, PolicyView
-from rebody.control.places import TaskCode, numbers_of, places_of
+from rebody.control.high_level import HighLevelPolicy
 from rebody.control.sac import SACBatch, SACState
 from rebody.errors import RebodyError
 from rebody.inference.mixture.padded import Clusters, clusters_of, no_clusters
@@ -34,6 +33,7 @@ from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, collect, refresh_beliefs, roles
 from rebody.training.inference.measure import measure
 from rebody.training.inference.report import save_inference
+from rebody.training.inference.told import ToldState, begun_with, initial_told, update_told
 from rebody.training.replay import store_group
 from rebody.training.run import Metrics, Run, measured
 from rebody.types import AnyArray, Transition
@@ -47,8 +47,8 @@ class RunState(eqx.Module):
 
     module: InferenceModule
     optimiser: optax.OptState
-    sac: SACState  # the high-level policy
-    privileged: SACState  # the same policy, told the task: the toy's oracle
+    sac: SACState | None  # the high-level policy that goes by beliefs, where there is one
+    told: ToldState  # the policy that is told the task: the toy's oracle
     clusters: Clusters
     replay: Episodes  # [group, episode, time]
     iteration: Int[Array, ""]
@@ -82,12 +82,12 @@ def train_inference(
 def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> tuple[RunState, Metrics]:
     """One turn of the loop."""
     iteration = int(state.iteration)
-    keys = jax.random.split(jax.random.fold_in(key, iteration), 3)
+    keys = jax.random.split(jax.random.fold_in(key, iteration), 4)
     module, optimiser, clusters = state.module, state.optimiser, state.clusters
-    policy, privileged = state.sac, state.privileged
+    policy, told = state.sac, state.told
 
-    acting = roles(config.episodes, all_wander=iteration < config.wander_iterations)
-    episodes = collect(module, policy.actor, toy, config, acting, keys[0])
+    acting = roles(config.episodes, iteration < config.wander_iterations, config.acts_by)
+    episodes = collect(module, (policy or told).actor, toy, config, acting, keys[0])
     metrics = {"return": episodes.reward[acting.decides].sum(-1).mean()}
     replay, stored = store_group(state.replay, episodes, state.iteration)
     if iteration < config.inference_iterations:
@@ -98,18 +98,15 @@ def iterate(state: RunState, toy: Toy, config: MetaConfig, key: PRNGKeyArray) ->
         module, optimiser, inference_metrics = update_inference(
             module, optimiser, replay, stored, latent_prior(clusters, config), config, keys[1]
         )
-        metrics |= inference_metrics
-    if iteration >= config.wander_iterations:
+        told, learned = update_told(told, toy, config, keys[3])
+        metrics |= inference_metrics | {f"told/{name}": value for name, value in learned.items()}
+    if policy is not None and iteration >= config.wander_iterations:
         if iteration < config.inference_iterations:
             replay = refresh_beliefs(module.encoder, replay, config.episodes // 2)
-            # it acts in no episode itself: later ones, of a policy that hardly explores, would lead it astray
-            told = with_tasks(replay, TaskCode(places_of(config.families)))
-            privileged, learned = update_policy(privileged, told, stored, config, config.told_view, keys[2])
-            metrics |= {f"told/{name}": value for name, value in learned.items()}
         interpreted = eqx.tree_at(lambda e: e.belief, replay, module.decoder.interpret(replay.belief))
-        policy, learned = update_policy(policy, interpreted, stored, config, config.policy_view, keys[2])
+        policy, learned = update_policy(policy, interpreted, stored, config, keys[2])
         metrics |= learned
-    state = RunState(module, optimiser, policy, privileged, clusters, replay, state.iteration + 1)
+    state = RunState(module, optimiser, policy, told, clusters, replay, state.iteration + 1)
     return state, measured(
         metrics,
         iteration,
@@ -130,23 +127,24 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     module_key, sac_key = jax.random.split(key)
     module = InferenceModule(config.inference, config.families, toy.actions, module_key)
     seen = config.policy_view.size(config.inference.latent)
-    told = places_of(config.families)
-    seen_told = config.told_view.size(len(told) + numbers_of(told))
-    policy, privileged = (sac.initial_state(size, toy.actions, config.sac, sac_key) for size in (seen, seen_told))
+    told = initial_told(config, toy, jax.random.fold_in(key, 2))
+    policy = sac.initial_state(seen, toy.actions, config.sac, sac_key) if config.acts_by == "belief" else None
     clusters = no_clusters(config.mixture.maximum, config.inference.clustered)
     if init_from is not None:
         parts = load_inference(init_from).parts
         module = load_pretrained(parts.module, module, init_from)
-        policy = sac.take_over(policy, parts.high_level.actor, init_from)
-        privileged = sac.take_over(privileged, parts.told_policy.actor, init_from)
+        if policy is not None and parts.high_level is not None:
+            policy = sac.take_over(policy, parts.high_level.actor, init_from)
+        told = begun_with(told, parts.told_policy.actor, init_from)
         if parts.mixture is not None and parts.mixture.mean.shape == clusters.prior.mean.shape:
             clusters = clusters_of(parts.mixture)
-    one_group = jax.eval_shape(lambda: collect(module, policy.actor, toy, config, roles(config.episodes, True), key))
+    actor = (policy or told).actor
+    one_group = jax.eval_shape(lambda: collect(module, actor, toy, config, roles(config.episodes, True), key))
     return RunState(
         module=module,
         optimiser=optimiser_of(config).init(eqx.filter(module, eqx.is_array)),
         sac=policy,
-        privileged=privileged,
+        told=told,
         clusters=clusters,
         replay=jax.tree.map(lambda leaf: jnp.zeros((config.groups, *leaf.shape), leaf.dtype), one_group),
         iteration=jnp.zeros((), jnp.int32),
@@ -162,10 +160,8 @@ def load_pretrained(trained: InferenceModule, fresh: InferenceModule, name: str)
 
 def trained_parts(state: RunState, config: MetaConfig) -> InferenceParts:
     """What is kept of a run, its probe not yet fitted."""
-    by_belief, by_task = (
-        HighLevelPolicy(policy.averaged_actor, view)
-        for policy, view in ((state.sac, config.policy_view), (state.privileged, config.told_view))
-    )
+    by_belief = state.sac and HighLevelPolicy(state.sac.averaged_actor, config.policy_view)
+    by_task = HighLevelPolicy(state.told.actor, config.told_view)
     mixture = jax.tree.map(jnp.asarray, state.clusters.prior) if config.prior == "mixture" else None
     return InferenceParts(state.module, by_belief, by_task, unfitted(config.families, config.inference.latent), mixture)
 
@@ -192,27 +188,14 @@ def update_inference(
 
 @eqx.filter_jit
 def update_policy(
-    policy: SACState, replay: Episodes, stored, config: MetaConfig, view: PolicyView, key: PRNGKeyArray
+    policy: SACState, replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray
 ) -> tuple[SACState, dict[str, Float[AnyArray, ""]]]:
-    """Steps of soft actor-critic on nominal episodes, with the beliefs held then as the policy sees them."""
+    """Steps of soft actor-critic on nominal episodes, with the beliefs that are held then."""
 
     def batch_of(_: None, key: PRNGKeyArray) -> SACBatch:
-        return sample_transitions(replay, stored, config, view, key)
+        return sample_transitions(replay, stored, config, key)
 
     return sac.update_many(policy, batch_of, None, jax.random.split(key, config.policy_updates), config.sac)
-
-
-def with_tasks(episodes: Episodes, code: TaskCode) -> Episodes:
-    """The same episodes with the truth in place of what was believed; the last task lasts beyond the end."""
-    time = episodes.task.family.ndim - 1
-    active = jax.tree.map(lambda leaf: _with_last(leaf, time), episodes.task)
-    return eqx.tree_at(lambda e: e.belief, episodes, code(active))
-
-
-def _with_last(leaf: AnyArray, axis: int) -> Array:
-    """The last entry along an axis twice."""
-    last = jax.lax.slice_in_dim(leaf, -1, None, axis=axis)
-    return jnp.concatenate([leaf, last], axis=axis)
 
 
 def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray) -> Evidence:
@@ -241,7 +224,7 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
     )
 
 
-def sample_transitions(replay: Episodes, stored, config: MetaConfig, view: PolicyView, key: PRNGKeyArray) -> SACBatch:
+def sample_transitions(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray) -> SACBatch:
     """Decisions of nominal episodes, with the beliefs before and after."""
     group_key, episode_key, time_key = jax.random.split(key, 3)
     size = (config.sac.batch_size,)
@@ -251,7 +234,7 @@ def sample_transitions(replay: Episodes, stored, config: MetaConfig, view: Polic
 
     def observation(time):
         state, belief = jax.tree.map(lambda leaf: leaf[group, episode, time], (replay.state, replay.belief))
-        return view(state, belief)
+        return config.policy_view(state, belief)
 
     return SACBatch(
         observation=observation(time),

@@ -113,15 +113,16 @@ class ToyGuide(eqx.Module):
             keep = decision < self.horizon
             return jax.tree.map(lambda new, old: jnp.where(keep, new, old), moved, toy_state), None
 
-        ahead, _ = jax.lax.scan(step, toy.from_global(state), jnp.arange(max_horizon))
-        return Subgoal(self.task.family, families.pad(jnp.where(is_place, ahead.x, ahead.drift)[..., None]))
+        ahead, _ = jax.lax.scan(step, toy.begin(state), jnp.arange(max_horizon))
+        return Subgoal(self.task.family, families.pad(jnp.where(is_place, ahead.position[..., 0], ahead.drift[..., 0])[..., None]))
 
 
 def _scripted_action(
     toy: MassDamper, state: ToyState, is_place: Bool[AnyArray, "*batch"], target: Float[AnyArray, "*batch"]
 ) -> Float[AnyArray, "*batch 1"]:
     """Full force towards a place until braking is due, or the force that brings the speed at once."""
-    braked = state.x + state.drift * toy.mass / toy.damping
+    x, drift = state.position[..., 0], state.drift[..., 0]
+    braked = x + drift * toy.mass / toy.damping
     speed = jnp.where(is_place, 10.0 * (target - braked), target)
-    force = toy.damping * state.drift + toy.mass * (speed - state.drift) / 0.1
+    force = toy.damping * drift + toy.mass * (speed - drift) / 0.1
     return jnp.clip(force / toy.max_force, -1.0, 1.0)[..., None]
