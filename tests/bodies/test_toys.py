@@ -188,7 +188,7 @@ def test_along_x_the_full_toy_is_the_mass_damper():
 
 @pytest.mark.parametrize("toy", TOYS)
 def test_along_held_axes_nothing_moves(toy):
-    rough = {name: 0.7 for name in ("ripple_amplitude", "pitch_ripple", "across_ripple", "yaw_ripple", "state_noise")}
+    rough = dict.fromkeys(("ripple_amplitude", "pitch_ripple", "across_ripple", "yaw_ripple", "state_noise"), 0.7)
     wild = {field: jnp.asarray(1.5) for field in GLOBAL_FIELDS}
     actions = np.random.default_rng(0).uniform(-1, 1, (50, toy.actions))
     states = states_of(toy, actions, start=GlobalState(**wild), ripple_period=0.53, ripple_phase=0.4, **rough)
@@ -315,7 +315,7 @@ def test_what_is_seen_of_a_toy(toy):
     seen, course = toy.observe(state), Course(state)
     for axis, rate in zip(AXES, RATES, strict=True):
         for name in (axis, rate):
-            np.testing.assert_array_equal(getattr(seen, name), getattr(course, name))
+            np.testing.assert_allclose(getattr(seen, name), getattr(course, name), atol=1e-6)
             assert bool(np.abs(getattr(seen, name)).min() > 0) == (axis in toy.axes)
     assert not np.asarray(seen.roll).any()
     assert not np.asarray(seen.roll_rate).any()
@@ -426,5 +426,7 @@ def test_a_toy_is_made_again_from_its_description(toy, described):
 
 def test_toys_have_names():
     assert make_toy("position") == PositionToy()
-    with pytest.raises(RebodyError, match=r"unknown toy 'spring'\. Toys are: mass-damper, position, full, plane, space"):
+    with pytest.raises(
+        RebodyError, match=r"unknown toy 'spring'\. Toys are: mass-damper, position, full, plane, space"
+    ):
         make_toy("spring")

@@ -128,7 +128,10 @@ def test_an_episode_of_one_decision_has_one_task():
 @pytest.mark.parametrize("of_numpy", [False, True])
 def test_in_a_ring_length_and_bearing_are_uniform(of_numpy):
     sector = FamilySet((PLANE.named("place").within(Box((2.0, 0.5), (6.0, 2.0), polar=True)), GOAL))
-    for families, low, high in ((PLANE.only(("place",)), (2.0, -np.pi), (15.0, np.pi)), (sector, (2.0, 0.5), (6.0, 2.0))):
+    for families, low, high in (
+        (PLANE.only(("place",)), (2.0, -np.pi), (15.0, np.pi)),
+        (sector, (2.0, 0.5), (6.0, 2.0)),
+    ):
         if of_numpy:
             rng = np.random.default_rng(0)
             tasks = [draw(families, rng) for _ in range(6000)]
@@ -152,7 +155,9 @@ def test_what_is_around_a_ring():
     assert Box((1.0,), (2.0,)).around == Box((1.0,), (2.0,))
 
 
-@pytest.mark.parametrize(("low", "high"), [((1.0,), (2.0,)), ((-1.0, 0.0), (2.0, 1.0)), ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))])
+@pytest.mark.parametrize(
+    ("low", "high"), [((1.0,), (2.0,)), ((-1.0, 0.0), (2.0, 1.0)), ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))]
+)
 def test_a_polar_box_is_of_a_plane(low, high):
     with pytest.raises(ValueError, match="a polar one has two numbers, a length that is not negative and a bearing"):
         Box(low, high, polar=True)

@@ -8,12 +8,12 @@ import jax.numpy as jnp
 
 from rebody.agents.agent import (
     Agent,
+    BelievingReuseAgent,
     FlatAgent,
     IdleAgent,
     OracleAgent,
     ReadoutAgent,
     RetrainAgent,
-    BelievingReuseAgent,
     SharpReuseAgent,
     ToldReuseAgent,
 )

@@ -74,6 +74,11 @@ class Inference:
         return tuple(Place(family.quantity, expert.scales) for family, expert in of_each)
 
     @property
+    def view(self) -> PolicyView:
+        """What a policy sees that goes by its beliefs."""
+        return replace(self.parts.told_policy.view, places=self.places)
+
+    @property
     def task_code(self) -> TaskCode:
         """How a task is put to the policy that is told it."""
         return TaskCode(places_of(self.contract.families))

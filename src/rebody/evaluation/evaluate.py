@@ -132,7 +132,10 @@ def _episodes_of(
 
 def frozen_hashes(inference: Inference) -> dict[str, str]:
     """SHA-256 of all that a transfer may not change."""
-    return {"module": tree_hash(inference.parts.module), "policy": tree_hash(inference.parts.high_level or inference.parts.told_policy)}
+    return {
+        "module": tree_hash(inference.parts.module),
+        "policy": tree_hash(inference.parts.high_level or inference.parts.told_policy),
+    }
 
 
 def trial_agent(trial: Trial, tasks: Task) -> Agent:

@@ -61,9 +61,9 @@ class Expert(eqx.Module):
         self.weights = MLP(amounts, 1 if is_quantity else len(fields), (units,), key=keys[1])
 
     def __call__(
-        self, state: Float[AnyArray, "*batch field"], amount: Float[AnyArray, "*batch amount"]
-    ) -> Float[AnyArray, "*batch"]:
-        """The expected reward, in units of the reward scale."""
+        self, state: Float[AnyArray, "*#batch field"], amount: Float[AnyArray, "*#batch amount"]
+    ) -> Float[AnyArray, "*#batch"]:
+        """The expected reward, in units of the reward scale; one amount may be of many states."""
         distance = jnp.abs(apart(state, self.place(amount), self.fields, self.scales))
         if self.is_quantity:
             distance = length(distance)[..., None]

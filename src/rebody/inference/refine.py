@@ -56,10 +56,10 @@ class Refined(NamedTuple):
 
 def surprise(
     expert: Expert,
-    state: Float[AnyArray, "*batch own"],
-    reward: Float[AnyArray, "*batch"],
-    amount: Float[AnyArray, "*batch amount"],
-) -> Float[AnyArray, "*batch"]:
+    state: Float[AnyArray, "*#batch own"],
+    reward: Float[AnyArray, "*#batch"],
+    amount: Float[AnyArray, "*#batch amount"],
+) -> Float[AnyArray, "*#batch"]:
     """Distance of rewards from what is expected, in standard deviations of the decoder's error."""
     return (reward - expert(state, amount)) / (FLOOR + RELATIVE * jnp.abs(reward))
 
@@ -72,8 +72,7 @@ def refine(heard: Heard, start: Float[AnyArray, " amount"], known: Known) -> Ref
     root = jnp.linalg.cholesky(known.information + ridge).T
 
     def unexplained(amount):
-        alike = jnp.broadcast_to(amount, (*heard.rewards.shape, size))
-        window = jnp.where(heard.is_heard, surprise(heard.expert, heard.states, heard.rewards, alike), 0.0)
+        window = jnp.where(heard.is_heard, surprise(heard.expert, heard.states, heard.rewards, amount[None]), 0.0)
         return jnp.concatenate([window, root @ (amount - known.centre), known.precision * (amount - known.guess)])
 
     def cost_of(amount):

@@ -115,7 +115,7 @@ class HighLevelLearner(Learner[TaskInference]):
     def sizes(self, batch: RobotBatch) -> tuple[int, int]:
         """Those of the toy's policy, and the numbers of each slot."""
         parts = self.module.parts
-        return parts.high_level.view.size(parts.module.encoder.latent), numbers_of(self.slots)
+        return self.module.view.size(parts.module.encoder.latent), numbers_of(self.slots)
 
     def begin(self, batch: RobotBatch, actor: Actor, key: PRNGKeyArray) -> TaskInference:
         """Robots that know nothing."""
@@ -153,7 +153,7 @@ class HighLevelLearner(Learner[TaskInference]):
     def observe(self, known: TaskInference) -> Float[AnyArray, "robot feature"]:
         """What the policy sees of each robot: what the toy's policy would see of a toy."""
         parts = self.module.parts
-        return _view(parts.high_level.view, parts.module.decoder, known)
+        return _view(self.module.view, parts.module.decoder, known)
 
     def update(self, policy: SACState, drawn: Any, key: PRNGKeyArray, iteration: int) -> tuple[SACState, dict]:
         """Values are of the slot that is chosen in the end."""
@@ -175,7 +175,7 @@ class HighLevelLearner(Learner[TaskInference]):
             inference_hash=tree_hash(module.parts.module),
             tracker=tracker.name,
             tracker_hash=tree_hash(tracker.tracker),
-            view=module.parts.high_level.view,
+            view=module.view,
             slots=self.slots,
             observations=actor.observations,
             hidden=config.sac.hidden,
@@ -198,7 +198,7 @@ class HighLevelLearner(Learner[TaskInference]):
 
     def policy(self, actor: Actor) -> SlotPolicy:
         """An actor, with what it sees and what its values ask for."""
-        return SlotPolicy(actor, self.module.parts.high_level.view, self.slots)
+        return SlotPolicy(actor, self.module.view, self.slots)
 
 
 def shaped(

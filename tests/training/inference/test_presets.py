@@ -23,7 +23,13 @@ MOVES = {
     "plane": {"x", "y", "yaw", "vx", "vy", "yaw_rate"},
 }
 SHOWN_BY = {
-    "goal": "x", "velocity": "x", "stand": "pitch", "jump": "vz", "place": "y", "velocity_xy": "vy", "heading": "yaw"
+    "goal": "x",
+    "velocity": "x",
+    "stand": "pitch",
+    "jump": "vz",
+    "place": "y",
+    "velocity_xy": "vy",
+    "heading": "yaw",
 }
 """The field without which a family's reward could not be understood."""
 

@@ -70,7 +70,9 @@ def test_a_share_starts_near_what_is_asked_for(brief):
     state = starts(task, toy, many, jax.random.key(1))
     for i, family in enumerate(brief.families):
         mine = np.asarray(task.family) == i
-        off = family.quantity.difference(np.asarray(family.quantity.read(state)), np.asarray(task.target)[:, : family.size])
+        off = family.quantity.difference(
+            np.asarray(family.quantity.read(state)), np.asarray(task.target)[:, : family.size]
+        )
         is_near = np.all(np.abs(off) <= family.floor, axis=-1)[mine]
         assert 0.27 < is_near.mean() < 0.55  # some are by chance
     assert np.abs(state.x).max() <= brief.start[0] + 1.0 + max(brief.families[0].range.high)

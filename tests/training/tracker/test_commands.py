@@ -9,6 +9,7 @@ from rebody.control.command import commands_within
 from rebody.control.tracker import MARGIN
 from rebody.ranges import Box, interval
 from rebody.tasks import SHIPPED, Family, FamilySet, Quantity
+from rebody.tasks.line import LINE
 from rebody.training.tracker.commands import CommandDistribution, ToyGuide, _scripted_action
 from rebody.types import Task, global_state
 
@@ -97,7 +98,7 @@ def test_a_guide_is_the_toy_stepped_as_often_as_it_is_ahead():
     task = Task(family, target[:, None])
     horizon = np.array([1, 4, 9, 1, 6, 9], np.int32)
     state = robots_at([0.0, 1.0, 0.4, 2.0, -5.0, 0.0], [0.0, 2.0, -0.5, 0.3, 1.0, 0.0])
-    subgoal = ToyGuide(task, horizon).subgoal(SHIPPED, state, 9)
+    subgoal = ToyGuide(task, horizon).subgoal(LINE, state, 9)
     np.testing.assert_array_equal(subgoal.slot, family)
 
     toy = MassDamper()
@@ -112,7 +113,7 @@ def test_a_guide_is_the_toy_stepped_as_often_as_it_is_ahead():
 def test_a_guide_one_decision_ahead_is_nearby():
     """As the subgoals of `reuse` at a horizon of 1: from rest, no farther than the toy accelerates in 0.1 s."""
     guide = ToyGuide(Task(np.array([GOAL]), np.array([[8.0]])), np.array([1]))
-    subgoal = guide.subgoal(SHIPPED, robots_at([0.0], [0.0]), 15)
+    subgoal = guide.subgoal(LINE, robots_at([0.0], [0.0]), 15)
     np.testing.assert_allclose(subgoal.value, 0.1 * 0.1 * 7.0, rtol=1e-5)
 
 
@@ -122,7 +123,7 @@ def test_a_guide_one_decision_ahead_is_nearby():
 )
 def test_the_scripted_toy_arrives(family, target, within):
     guide = ToyGuide(Task(np.array([family]), np.array([[target]], np.float32)), np.array([60]))
-    np.testing.assert_allclose(guide.subgoal(SHIPPED, robots_at([0.0], [1.0]), 60).value, target, atol=within)
+    np.testing.assert_allclose(guide.subgoal(LINE, robots_at([0.0], [1.0]), 60).value, target, atol=within)
 
 
 LOPSIDED = within(goal=(-4.0, 4.0), velocity=(-1.0, 3.0), stand=(-0.5, 1.5))

@@ -1,6 +1,5 @@
 """Beliefs on the toy: what the classifier learns from, and what the slots of clusters are found on."""
 
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp

@@ -12,8 +12,8 @@ from jaxtyping import Bool, Float, PRNGKeyArray
 from rebody.agents.configs import understood
 from rebody.bodies.disturbance import Randomisation, no_disturbance
 from rebody.bodies.toys import Toy, ToyState
-from rebody.control.sac import Actor
 from rebody.control.places import TaskCode, places_of
+from rebody.control.sac import Actor
 from rebody.inference import Encoder, InferenceModule
 from rebody.store import Artifact
 from rebody.tasks import FamilySet

@@ -149,6 +149,10 @@ def plane() -> MetaConfig:
         home_share=0.5,
         acts_by="task",
         wander_iterations=5,
+        joint_iterations=55,
+        evaluate_every=20,
+        held_out=100,
+        held_out_s=30.0,
     )
 
 

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optax
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Float, PRNGKeyArray
 
 from rebody.bodies.toys import Toy
 from rebody.control.places import TaskCode, numbers_of, places_of
@@ -18,7 +18,7 @@ from rebody.tasks.family_set import sample
 from rebody.training.arrival import arrival_bonus
 from rebody.training.descent import Metrics, descend
 from rebody.training.inference.config import MetaConfig
-from rebody.types import GlobalState, Task, global_state
+from rebody.types import AnyArray, GlobalState, Task, global_state
 
 
 class ToldState(eqx.Module):
@@ -57,7 +57,7 @@ def update_told(state: ToldState, toy: Toy, config: MetaConfig, key: PRNGKeyArra
     return ToldState(actor, optimiser), metrics
 
 
-def course(actor: Actor, toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> Float[Array, "decision course"]:
+def course(actor: Actor, toy: Toy, config: MetaConfig, key: PRNGKeyArray) -> Float[AnyArray, "decision course"]:
     """Rewards of nominal toys that go by the policy."""
     task_key, start_key = jax.random.split(key)
     task = sample(config.families, task_key, (config.told.courses,))

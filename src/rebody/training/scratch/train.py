@@ -34,9 +34,8 @@ from rebody.tasks import SHIPPED
 from rebody.tasks.family_set import sample_episodes
 from rebody.training.card import save
 from rebody.training.held_out import act, figures_of, rows_of
-from rebody.training.inference.episodes import Episodes, refresh_beliefs
+from rebody.training.inference.episodes import Episodes, refresh_beliefs, with_tasks
 from rebody.training.inference.measure import contract_of, probe_of
-from rebody.training.inference.episodes import with_tasks
 from rebody.training.inference.train import load_pretrained, optimiser_of, update_inference
 from rebody.training.motion import decision, privileged_reward, put_on_feet
 from rebody.training.off_policy import ready_robot

@@ -110,11 +110,16 @@ class ToyGuide(eqx.Module):
         def step(toy_state: ToyState, decision):
             action = _scripted_action(toy, toy_state, is_place, self.task.target[..., 0])
             moved = toy.step(toy_state, action, jax.random.key(0))
-            keep = decision < self.horizon
-            return jax.tree.map(lambda new, old: jnp.where(keep, new, old), moved, toy_state), None
+            return jax.vmap(_either)(decision < self.horizon, moved, toy_state), None
 
         ahead, _ = jax.lax.scan(step, toy.begin(state), jnp.arange(max_horizon))
-        return Subgoal(self.task.family, families.pad(jnp.where(is_place, ahead.position[..., 0], ahead.drift[..., 0])[..., None]))
+        return Subgoal(
+            self.task.family, families.pad(jnp.where(is_place, ahead.position[..., 0], ahead.drift[..., 0])[..., None])
+        )
+
+
+def _either(which: Bool[AnyArray, ""], first: ToyState, second: ToyState) -> ToyState:
+    return jax.tree.map(lambda a, b: jnp.where(which, a, b), first, second)
 
 
 def _scripted_action(
