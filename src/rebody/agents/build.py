@@ -3,7 +3,7 @@
 from typing import Literal
 
 from rebody.agents.agent import Agent
-from rebody.agents.fits import check_predictor, check_slots
+from rebody.agents.fits import ANY_WALKER, check_predictor, check_slots
 from rebody.agents.kinds import KINDS, Ingredients
 from rebody.agents.parts import (
     Inference,
@@ -41,7 +41,7 @@ def check_robot_of(
     part: LoadedTracker | LoadedFlat | LoadedScratch | LoadedHighLevel | LoadedStepPredictor, spec: RobotSpec
 ) -> None:
     """RebodyError if a policy was trained on another robot, or on another description of it."""
-    if part.robot != spec.name:
+    if part.robot != (spec.name if spec.walking is None else ANY_WALKER):
         raise RebodyError(f"'{part.name}' was trained on '{part.robot}', not on '{spec.name}'.")
     if isinstance(part, LoadedTracker) and part.tracker.joints != spec.tracker_inputs:
         raise RebodyError(

@@ -15,18 +15,22 @@ from rebody.control.sac import Actor
 from rebody.errors import RebodyError
 
 
+ANY_WALKER = "joystick"
+"""The robot of a navigator: all that walk by a policy of their own."""
+
+
 def check_sizes(part: LoadedTracker | LoadedFlat | LoadedScratch | LoadedHighLevel, spec: RobotSpec, module: Inference):
     """RebodyError where a policy does not see what the robot and the module's beliefs give, or moves other joints."""
     latent = module.parts.module.encoder.latent
     match part:
         case LoadedTracker(tracker=tracker):
-            _check_actor(part.name, tracker.actor, tracker.actor.observations, spec.model.nu)
+            _check_actor(part.name, tracker.actor, tracker.actor.observations, spec.actions)
         case LoadedFlat(policy=policy):
             _check_places(part.name, policy.view.places, module)
-            _check_actor(part.name, policy.actor, policy.view.size(spec.joint_inputs, latent), spec.model.nu)
+            _check_actor(part.name, policy.actor, policy.view.size(spec.joint_inputs, latent), spec.actions)
         case LoadedScratch(parts=parts):
             own = parts.module.encoder.latent
-            _check_actor(part.name, parts.policy.actor, parts.policy.view.size(spec.joint_inputs, own), spec.model.nu)
+            _check_actor(part.name, parts.policy.actor, parts.policy.view.size(spec.joint_inputs, own), spec.actions)
         case LoadedHighLevel(policy=policy):
             _check_places(part.name, policy.view.places, module)
             if [slot.quantity for slot in policy.slots] != [family.quantity for family in module.contract.families]:

@@ -14,7 +14,7 @@ from rebody.agents.build import HORIZON, build_agent, check_robot_of, slot_choos
 from rebody.agents.clock import begin, decide, pass_over
 from rebody.agents.controller import TrackerController
 from rebody.agents.doubts import RewardWatch
-from rebody.agents.parts import Inference, LoadedSlots, LoadedTracker, load_inference, load_slots_of, load_tracker
+from rebody.agents.parts import Inference, LoadedSlots, LoadedTracker, load_inference, load_slots_of, load_tracker, tracker_of
 from rebody.agents.rollout import joint_action
 from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
@@ -204,5 +204,5 @@ def load_agent(
     spec, module = load_robot(robot), load_inference(inference)
     by_belief = classifier is None and sharpen and module.can_sharpen
     slots = None if by_belief else load_slots_of(module, classifier)
-    tracked = load_tracker(f"tracker-{spec.name}" if tracker is None else tracker)
+    tracked = load_tracker(tracker_of(spec) if tracker is None else tracker)
     return LiveAgent(spec, module, tracked, slots, horizon, on_bad_input, sharpen)

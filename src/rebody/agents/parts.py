@@ -22,6 +22,7 @@ from rebody.agents.configs import (
     understood,
 )
 from rebody.agents.slots import SlotClassifier
+from rebody.bodies import RobotSpec
 from rebody.bodies.toys import Toy
 from rebody.control.flat import FlatPolicy, FlatView
 from rebody.control.high_level import HighLevelPolicy, PolicyView
@@ -260,6 +261,11 @@ def load_tracker(reference: str) -> LoadedTracker:
     """A shipped tracker artifact by name, or one in a folder; RebodyError if it cannot be read."""
     name, settings, tracker = _load(reference, "tracker", TrackerSettings, tracker_template)
     return LoadedTracker(name, settings.robot, tracker)
+
+
+def tracker_of(spec: RobotSpec) -> str:
+    """Name of the tracker that a robot follows where no other is asked for: of one that walks already the navigator."""
+    return f"tracker-{spec.name}" if spec.walking is None else "navigator"
 
 
 def load_flat(reference: str) -> LoadedFlat:

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 from rebody.agents.agent import Agent, Observation
 from rebody.agents.clock import Clock, EvenClock
 from rebody.agents.controller import Controller
-from rebody.bodies import RobotBatch, RobotSpec, Simulation
+from rebody.bodies import RobotSpec, Simulation, simulate
 from rebody.bodies.disturbance import Disturbance
 from rebody.bodies.toys import Toy
 from rebody.tasks import FamilySet
@@ -113,7 +113,7 @@ def rollout_on_robot(
     What is returned is 0.1 s apart, whatever the clock.
     """
     decisions, size = tasks.family.shape
-    body = RobotBatch(spec, size)
+    body = simulate(spec, size)
     for episode, seed in enumerate(starts):
         body.reset(np.random.default_rng(seed), np.arange(size) == episode)
     drive = Drive(agent, controller, body, families, clock)

@@ -101,9 +101,14 @@ class RobotBatch(Simulation):
 
     def step(self, actions):
         """RebodyError if a simulation diverged."""
-        before, (low, high) = self._root(), self.spec.model.actuator_ctrlrange.T
+        low, high = self.spec.model.actuator_ctrlrange.T
         # centre and half-width, so that an action in a range of [-1, 1] arrives without rounding
         self._ctrl[:] = 0.5 * (low + high) + 0.5 * (high - low) * np.clip(actions, -1.0, 1.0)
+        self._advance()
+
+    def _advance(self) -> None:
+        """A control step; RebodyError if a simulation diverged."""
+        before = self._root()
         self._batch.step(nstep=self.spec.frame_skip)
         if self._batch.warning[:, _DIVERGED, 1].any():
             raise RebodyError(

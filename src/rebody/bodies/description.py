@@ -1,6 +1,8 @@
 """Robots from TOML files: one format for the shipped ones and for a user's own."""
 
 import math
+import os
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +14,8 @@ import msgspec
 from rebody import inputs
 from rebody.bodies.model import Space
 from rebody.bodies.robot import Fall, Reach, RobotSpec
+from rebody.bodies.walking.joystick import NAVIGATED_M, Joystick
+from rebody.bodies.walking.settings import Phase, Term, Walking
 from rebody.errors import RebodyError, unknown
 from rebody.names import ROBOTS, shipped_robots
 from rebody.ranges import Box
@@ -36,6 +40,37 @@ class _Fall(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     lasts_s: float = Fall.lasts_s
 
 
+class _Phase(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    frequency: float
+    offsets: tuple[float, ...] = Phase.offsets
+    at_rest: float | None = None
+
+
+class _Joystick(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    forward: tuple[float, float]
+    sideways: tuple[float, float]
+    turn: tuple[float, float]
+    dead: tuple[float, float, float] = Joystick.dead
+    drift: tuple[float, float, float] = Joystick.drift
+
+
+class _Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    onnx: str
+    joystick: _Joystick
+    inputs: tuple[Term, ...] = ()
+    imu: str | None = None
+    action_scale: float | tuple[float, ...] | None = None
+    joints: tuple[str, ...] = ()
+    unheard: tuple[str, ...] = ()
+    scales: dict[Term, float] = {}
+    clip: float | None = None
+    action_clip: float | None = None
+    history: int = 1
+    phase: _Phase | None = None
+    stiffness: tuple[float, ...] = ()
+    damping: tuple[float, ...] = ()
+
+
 class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a robot's file says; `RobotSpec` says what it means."""
 
@@ -44,6 +79,7 @@ class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     root: _Root
     fall: _Fall
     reach: dict[str, list[Any]]
+    policy: _Policy | None = None
     keyframe: str | None = None
     rest: dict[str, float] = {}
     timestep: float | None = None
@@ -74,6 +110,7 @@ def _read(path: Path) -> RobotSpec:
     spec = RobotSpec(
         name=path.stem,
         mjcf=_mjcf(description.mjcf, path),
+        walking=description.policy and _walking(description.policy, path),
         frame_skip=description.frame_skip,
         root=_root(description.root, path),
         space=description.root.space,
@@ -82,7 +119,7 @@ def _read(path: Path) -> RobotSpec:
         rest=tuple(description.rest.items()),
         reset_noise=description.reset_noise,
         smoothing_s=description.smoothing_s,
-        goal_ahead=description.goal_ahead,
+        goal_ahead=_goal_ahead(description),
         fall=Fall(**msgspec.structs.asdict(description.fall)),
         reach=_reach(description.reach, path),
     )
@@ -90,10 +127,55 @@ def _read(path: Path) -> RobotSpec:
     return spec
 
 
+def _goal_ahead(description: _Description) -> float:
+    """A navigator knows no farther places."""
+    return min(description.goal_ahead, math.inf if description.policy is None else NAVIGATED_M)
+
+
 def _mjcf(mjcf: str, path: Path) -> Path:
     if mjcf.startswith(GYMNASIUM_PREFIX):
         return GYMNASIUM_ASSETS / mjcf.removeprefix(GYMNASIUM_PREFIX)
-    return path.parent / mjcf
+    return path.parent / _with_variables(mjcf, path)
+
+
+def _with_variables(said: str, path: Path) -> str:
+    """With the values of environment variables, written ${NAME}; RebodyError where one is not set."""
+    for name in re.findall(r"\$\{(\w+)\}", said):
+        if name not in os.environ:
+            raise RebodyError(f"'{path}' names ${{{name}}}, which is not set: export {name}=FOLDER first.")
+        said = said.replace(f"${{{name}}}", os.environ[name])
+    return said
+
+
+def _walking(policy: _Policy, path: Path) -> Walking:
+    """RebodyError for what cannot be."""
+    said, stick = msgspec.structs.asdict(policy), policy.joystick
+    problems = [
+        f"{name} must be at least {least}, and finite"
+        for name, value, least in (("history", policy.history, 1), ("phase.frequency", _frequency(policy), 0))
+        if not least <= value < math.inf
+    ]
+    ways = (stick.forward, stick.sideways, stick.turn)
+    if not all(-math.inf < low <= 0 <= high < math.inf for low, high in ways):
+        problems.append("joystick: each way must be [low, high] around 0")
+    if not all(0 <= slowest < math.inf for slowest in stick.dead):
+        problems.append("joystick.dead must not be negative")
+    if problems:
+        raise RebodyError(f"'{path}': [policy] {'; '.join(problems)}.")
+    low, high = zip(*ways, strict=True)
+    return Walking(
+        **said
+        | {
+            "onnx": path.parent / _with_variables(policy.onnx, path),
+            "joystick": Joystick(Box(low, high), stick.dead, stick.drift),
+            "scales": tuple(policy.scales.items()),
+            "phase": policy.phase and Phase(**msgspec.structs.asdict(policy.phase)),
+        }
+    )
+
+
+def _frequency(policy: _Policy) -> float:
+    return 0.0 if policy.phase is None else policy.phase.frequency
 
 
 def _root(root: _Root, path: Path) -> tuple[str, str, str] | str:

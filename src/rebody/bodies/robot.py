@@ -14,6 +14,8 @@ from rebody.bodies.attitude import wrap_angle as wrap_angle  # where others look
 from rebody.bodies.control_step import steps_per_decision
 from rebody.bodies.model import PLANE_JOINTS, Compiled, Space, compile_model
 from rebody.bodies.readout import HINGE, SLIDE, FreeReadout, PlanarReadout, Readout
+from rebody.bodies.walking import Walking
+from rebody.bodies.walking.joystick import NAVIGATOR_SEES, WAYS
 from rebody.errors import RebodyError
 from rebody.ranges import Box
 from rebody.types import GlobalState
@@ -68,6 +70,8 @@ class RobotSpec:
     """Whether a root body that floats freely is held to the plane of x and z."""
     keyframe: str | None = None
     """Name of the model's keyframe that it rests in, but for what `rest` says; None for the model's own pose."""
+    walking: Walking | None = None
+    """The policy that it walks by, where it follows a joystick; None where a tracker moves its joints."""
 
     @cached_property
     def compiled(self) -> Compiled:
@@ -88,6 +92,11 @@ class RobotSpec:
     def steps_per_decision(self) -> int:
         """Control steps of one decision; RebodyError where they do not divide it."""
         return steps_per_decision(self.name, self.frame_skip, self.model.opt.timestep)
+
+    @property
+    def actions(self) -> int:
+        """Numbers in its action: joints, or the joystick's ways."""
+        return self.model.nu if self.walking is None else len(WAYS)
 
     @property
     def floats_freely(self) -> bool:
@@ -165,7 +174,7 @@ class RobotSpec:
     @property
     def tracker_inputs(self) -> int:
         """How many numbers a tracker sees of the body."""
-        return self.joint_inputs + (self.smoothing_s > 0)
+        return self.joint_inputs + (self.smoothing_s > 0) if self.walking is None else NAVIGATOR_SEES
 
     def next_pace(self, pace: Floats, moved: Floats) -> Floats:
         """The pace [m/s] after a control step by `moved` [m]."""

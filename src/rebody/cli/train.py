@@ -20,6 +20,7 @@ from rebody.training.classifier import ClassifierConfig, train_classifier
 from rebody.training.flat import FlatConfig, train_flat
 from rebody.training.high_level import HighLevelConfig, train_high_level
 from rebody.training.inference import PRESETS, MetaConfig, train_inference
+from rebody.training.navigator import NavigatorConfig, train_navigator
 from rebody.training.scratch import ScratchConfig, train_scratch
 from rebody.training.step_predictor import StepPredictorConfig, train_step_predictor
 from rebody.training.tracker import TrackerConfig, tracker_preset, train_tracker
@@ -177,6 +178,19 @@ class TrainClassifier:
         _show_card(train_classifier(self.inference, self.config, **vars(self.options)))
 
 
+@dataclass(frozen=True)
+class TrainNavigator:
+    """Train what turns subgoals into joystick commands, for robots that walk by a policy of their own; everything
+    happens on a joystick toy."""
+
+    options: Run = field(default_factory=RunOptions)
+    config: Annotated[NavigatorConfig, FLAT] = field(default_factory=NavigatorConfig)
+
+    def run(self) -> None:
+        """Train, save, say where."""
+        _show_card(train_navigator(self.config, **vars(self.options)))
+
+
 def train_command(arguments: Sequence[str]) -> type:
     """Train a part; every shipped artifact is made by these commands."""
     robots = {name: f"The tracker of the {name}." for name in shipped_robots()}
@@ -195,6 +209,7 @@ def train_command(arguments: Sequence[str]) -> type:
         "inference": _one_of(of_preset, TrainInference.__doc__, presets()),
         "tracker": _one_of(of_robot, f"{TrainTracker.__doc__} Your own: the path of its TOML file.", robots),
         "classifier": TrainClassifier,
+        "navigator": TrainNavigator,
         "high-level": TrainHighLevel,
         "flat": TrainFlat,
         "scratch": TrainScratch,

@@ -16,8 +16,9 @@ from rebody.agents.parts import (
     load_slots_of,
     load_step_predictor,
     load_tracker,
+    tracker_of,
 )
-from rebody.bodies import load_robot
+from rebody.bodies import RobotSpec, load_robot
 from rebody.errors import RebodyError
 from rebody.evaluation.trial import POINT_MASS, Trial
 from rebody.names import AGENTS
@@ -37,7 +38,7 @@ class TrialOptions:
     """Inference artifact: a shipped name or a folder."""
     agent: Annotated[str, tyro.conf.arg(help=AGENT_HELP)] = "reuse"
     tracker: str | None = None
-    """Tracker artifact; default tracker-ROBOT."""
+    """Tracker artifact; default tracker-ROBOT, or the navigator for a robot that walks by a policy of its own."""
     flat: str | None = None
     """Policy of agent `flat`; default flat-INFERENCE-ROBOT."""
     scratch: str | None = None
@@ -73,7 +74,7 @@ class TrialOptions:
         inference, robot, parts = load_inference(self.inference), None, {}
         if self.robot != POINT_MASS:
             robot = load_robot(self.robot)
-            parts = self._parts(inference, robot.name)
+            parts = self._parts(inference, robot)
         return Trial(
             agent=self.agent,
             robot=robot,
@@ -88,10 +89,10 @@ class TrialOptions:
             **{"tracker": None} | parts,
         )
 
-    def _parts(self, inference: Inference, robot: str) -> dict[str, Any]:
+    def _parts(self, inference: Inference, spec: RobotSpec) -> dict[str, Any]:
         """What moves a robot: its tracker, and what else the agent needs."""
-        module = Path(self.inference).name
-        parts: dict[str, Any] = {"tracker": load_tracker(_named(self.tracker, f"tracker-{robot}"))}
+        module, robot = Path(self.inference).name, spec.name
+        parts: dict[str, Any] = {"tracker": load_tracker(_named(self.tracker, tracker_of(spec)))}
         match self.agent:
             case "flat":
                 parts["flat"] = load_flat(_named(self.flat, f"flat-{module}-{robot}"))

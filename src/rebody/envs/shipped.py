@@ -4,7 +4,7 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from rebody.bodies import PointMasses, RobotBatch, RobotSpec, load_robot
+from rebody.bodies import PointMasses, RobotSpec, load_robot, simulate
 from rebody.bodies.toys import MassDamper
 from rebody.envs.single import TaskEnv
 from rebody.envs.vector import TaskVectorEnv
@@ -43,7 +43,7 @@ class RobotEnv(TaskEnv):
         """`robot` is a shipped name or the path of a TOML file; settings as `TaskEnv` has them."""
         spec = load_robot(robot)
         self.metadata = _robot_metadata(spec)
-        super().__init__(RobotBatch(spec, 1, threads=1), **settings)
+        super().__init__(simulate(spec, 1, threads=1), **settings)
 
 
 class RobotVectorEnv(TaskVectorEnv):
@@ -55,7 +55,7 @@ class RobotVectorEnv(TaskVectorEnv):
         """`threads` = 0 uses every processor; the rest as for `RobotEnv` and `TaskVectorEnv`."""
         spec = load_robot(robot)
         self.metadata = _robot_metadata(spec) | _NEXT_STEP
-        super().__init__(RobotBatch(spec, num_envs, threads), **settings)
+        super().__init__(simulate(spec, num_envs, threads), **settings)
 
 
 def _robot_metadata(spec: RobotSpec) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Int
 
 from rebody.agents.controller import TrackerController
 from rebody.agents.rollout import follow
-from rebody.bodies import RobotBatch, RobotSpec, Simulation
+from rebody.bodies import RobotSpec, Simulation, simulate
 from rebody.control.command import Command, absolute
 from rebody.control.places import UNBOUNDED
 from rebody.control.tracker import Tracker
@@ -50,7 +50,7 @@ class Countdown:
 
 def stress(tracker: Tracker, spec: RobotSpec, episodes: int, seed: int = 0) -> StressResult:
     """Random subgoals within reach, changed every 1 to 5 s for 20 s, and a push every 3 to 5 s."""
-    rng, batch = np.random.default_rng(seed), RobotBatch(spec, episodes)
+    rng, batch = np.random.default_rng(seed), simulate(spec, episodes)
     batch.reset(rng)
     subgoal, fell = _subgoals(tracker, batch, rng), np.zeros(episodes, bool)
     changes, pushes = (Countdown(rng, range_s, spec.control_dt, episodes) for range_s in (CHANGE_S, PUSH_S))

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from rebody.agents.agent import Observation
 from rebody.agents.belief import Reading
 from rebody.agents.rollout import Drive
-from rebody.bodies import PointMasses, RobotBatch, Simulation
+from rebody.bodies import PointMasses, Simulation, simulate
 from rebody.control.places import reachable
 from rebody.evaluation.evaluate import trial_agent, trial_controller
 from rebody.evaluation.trial import Trial, check_trial
@@ -53,7 +53,7 @@ class Session:
         if trial.robot is None:
             self.body, self._controller = PointMasses(trial.inference.toy, 1), None
         else:
-            self.body, self._controller = RobotBatch(trial.robot, 1, threads=1), trial_controller(trial)
+            self.body, self._controller = simulate(trial.robot, 1, threads=1), trial_controller(trial)
         self.restart()
         for _ in range(self.body.steps_per_decision):
             self.step()

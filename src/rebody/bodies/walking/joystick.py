@@ -1,0 +1,73 @@
+"""Joystick commands: forward, sideways [m/s] and turn [rad/s] in the heading's frame, as walking policies follow."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from rebody.ranges import Box
+from rebody.types import GlobalState
+
+WAYS = ("forward", "sideways", "turn")
+NAVIGATOR_SEES = 15
+"""Numbers of `navigator_sees`."""
+NAVIGATED_M = 3.0
+"""How far ahead a navigator is shown a place [m]."""
+REST = 0.05
+"""Actions below this are none: the stick is let go."""
+
+
+class Measured(NamedTuple):
+    """What is known of a walking policy, forward, sideways [m/s] and turn [rad/s]: [*batch, 3] each, NumPy or JAX."""
+
+    low: Any
+    high: Any
+    dead: Any
+    drift: Any
+
+
+@dataclass(frozen=True)
+class Joystick:
+    """What a walking policy follows, as `rebody robot check` measures it."""
+
+    limits: Box
+    """Forward, sideways [m/s], turn [rad/s]; both ends 0 for a way that it does not go."""
+    dead: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """The slowest command of each way that moves the robot."""
+    drift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """How it moves while none is given."""
+
+    @property
+    def measured(self) -> Measured:
+        """As arrays."""
+        parts = (self.limits.low, self.limits.high, self.dead, self.drift)
+        return Measured(*(np.asarray(each, np.float32) for each in parts))
+
+    def command(self, actions: Any) -> Any:
+        """Commands for actions [..., 3] in [-1, 1], of NumPy or JAX: none at rest, else beyond the dead band.
+
+        Slow commands that a policy takes for standing still are stepped over: whoever asks for 0.1 m/s near its goal
+        would wait for ever.
+        """
+        xp = jnp if isinstance(actions, jax.Array) else np
+        return joystick_command(actions, self.measured, xp)
+
+
+def joystick_command(actions: Any, robot: Measured, xp: Any) -> Any:
+    """`Joystick.command` of arrays."""
+    share = (xp.clip(abs(actions), REST, 1.0) - REST) / (1.0 - REST)
+    most = xp.where(actions > 0, robot.high, -robot.low)
+    size = xp.minimum(robot.dead + share * (most - robot.dead), most)
+    return xp.where(abs(actions) > REST, xp.sign(actions) * xp.maximum(size, 0.0), 0.0)
+
+
+def navigator_sees(state: GlobalState, robot: Measured, xp: Any) -> Any:
+    """What a navigator knows of a body, [*batch, 15]: how it moved over the last 0.1 s in the frame of its heading
+    [m/s, rad/s], then what was measured of it.
+    """
+    cos, sin = xp.cos(state.yaw), xp.sin(state.yaw)
+    ahead, left = cos * state.vx + sin * state.vy, cos * state.vy - sin * state.vx
+    moves = xp.stack([ahead, left, state.yaw_rate], axis=-1)
+    return xp.concatenate([moves, *(xp.broadcast_to(each, moves.shape) for each in robot)], axis=-1)

@@ -1,0 +1,119 @@
+"""The joystick toy: a body in the plane that follows joystick commands as badly as robots do. Navigators learn on it."""
+
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float, PRNGKeyArray
+
+from rebody.bodies.walking.joystick import Measured, joystick_command, navigator_sees
+from rebody.ranges import NotNegative, Share
+from rebody.types import DECISION_DT, AnyArray, GlobalState, global_state
+
+Ways = Float[AnyArray, "*batch 3"]
+"""Forward, sideways [m/s], turn [rad/s]."""
+
+
+class Walker(eqx.Module):
+    """How one robot follows: what is measured of it, and what is not."""
+
+    measured: Measured
+    gain: Ways  # share of a command that is reached
+    lag: Ways  # s
+    across: Float[AnyArray, "*batch"]  # m/s sideways for each rad/s of turning
+    bias: Ways  # drift beside the one that is measured
+
+
+class WalkerState(eqx.Module):
+    """Where it is and how it moves, in the frame of its heading."""
+
+    x: Float[AnyArray, "*batch"]
+    y: Float[AnyArray, "*batch"]
+    yaw: Float[AnyArray, "*batch"]
+    speed: Ways
+
+
+@dataclass(frozen=True)
+class Walkers:
+    """Ranges that robots are drawn from uniformly, forward, sideways and turn."""
+
+    fastest: tuple[tuple[NotNegative, NotNegative], ...] = ((0.5, 1.6), (0.15, 0.9), (0.5, 1.6))
+    """Of the largest command ahead, to the left, and of a turn [m/s, m/s, rad/s]."""
+    backwards: tuple[NotNegative, NotNegative] = (0.3, 1.0)
+    """Share of the fastest ahead."""
+    dead: tuple[NotNegative, NotNegative, NotNegative] = (0.3, 0.3, 0.3)
+    """Largest dead bands."""
+    drift: tuple[NotNegative, NotNegative, NotNegative] = (0.2, 0.1, 0.15)
+    """Largest drifts that are measured; a quarter of these is not."""
+    gain: tuple[NotNegative, NotNegative] = (0.5, 1.2)
+    """Share of a command that is reached."""
+    lag: tuple[NotNegative, NotNegative] = (0.05, 0.5)
+    """Time constants [s]."""
+    straight: Share = 0.15
+    """Share of the robots that cannot walk sideways."""
+
+    def sample(self, key: PRNGKeyArray, size: int) -> Walker:
+        """So many robots, half of them without dead bands and drift."""
+        keys = iter(jax.random.split(key, 10))
+
+        def between(low, high):
+            return jax.random.uniform(next(keys), (size, 3), minval=jnp.asarray(low), maxval=jnp.asarray(high))
+
+        high = between(*zip(*self.fastest, strict=True))
+        sideways = jnp.where(jax.random.bernoulli(next(keys), self.straight, (size, 1)), 0.0, 1.0)
+        high = high * jnp.concatenate([jnp.ones((size, 1)), sideways, jnp.ones((size, 1))], axis=-1)
+        low = -high * jnp.where(jnp.arange(3) == 0, between(*self.backwards), 1.0)
+        is_rough = jax.random.bernoulli(next(keys), 0.5, (2, size, 1))
+        dead, drift = jnp.asarray(self.dead), jnp.asarray(self.drift)
+        return Walker(
+            measured=Measured(
+                low,
+                high,
+                dead=jnp.minimum(is_rough[0] * between(0 * dead, dead), 0.6 * jnp.minimum(high, -low)),
+                drift=is_rough[1] * between(-drift, drift),
+            ),
+            gain=between(*self.gain),
+            lag=between(*self.lag),
+            across=between(-0.15, 0.15)[:, 0],
+            bias=0.25 * between(-drift, drift),
+        )
+
+
+def begin(x: AnyArray, y: AnyArray, yaw: AnyArray) -> WalkerState:
+    """At rest."""
+    return WalkerState(x, y, yaw, jnp.zeros((*jnp.shape(x), 3)))
+
+
+def step(state: WalkerState, walker: Walker, action: Ways) -> WalkerState:
+    """One decision of 0.1 s with an action in [-1, 1].
+
+    Derivatives are those of a joystick without rest and dead band, which have none.
+    """
+    robot = walker.measured
+    smooth = action * jnp.where(action > 0, robot.high, -robot.low)
+    command = smooth + jax.lax.stop_gradient(joystick_command(action, robot, jnp) - smooth)
+    wanted = walker.gain * command + robot.drift + walker.bias
+    wanted = wanted.at[..., 1].add(walker.across * command[..., 2])
+    speed = state.speed + (wanted - state.speed) * DECISION_DT / (DECISION_DT + walker.lag)
+    yaw = state.yaw + DECISION_DT * speed[..., 2]
+    along = 0.5 * (state.yaw + yaw)
+    cos, sin = jnp.cos(along), jnp.sin(along)
+    x = state.x + DECISION_DT * (cos * speed[..., 0] - sin * speed[..., 1])
+    y = state.y + DECISION_DT * (sin * speed[..., 0] + cos * speed[..., 1])
+    return WalkerState(x, y, yaw, speed)
+
+
+def observe(state: WalkerState) -> GlobalState:
+    """The global state."""
+    cos, sin = jnp.cos(state.yaw), jnp.sin(state.yaw)
+    ahead, left, turn = jnp.moveaxis(state.speed, -1, 0)
+    yaw = jnp.arctan2(sin, cos)
+    return global_state(
+        x=state.x, y=state.y, yaw=yaw, vx=cos * ahead - sin * left, vy=sin * ahead + cos * left, yaw_rate=turn
+    )
+
+
+def sees(state: WalkerState, walker: Walker) -> Float[AnyArray, "*batch 15"]:
+    """What a navigator knows of it."""
+    return navigator_sees(observe(state), walker.measured, jnp)
