@@ -32,9 +32,11 @@ class WalkingBatch(RobotBatch):
 
     def step(self, actions):
         """The joystick, until the next step."""
-        command = self._joystick.command(np.clip(np.asarray(actions, float), -1.0, 1.0))
+        self.follow(self._joystick.command(np.clip(np.asarray(actions, float), -1.0, 1.0)))
+
+    def follow(self, command: Float[np.ndarray, "robot 3"]) -> None:
+        """A control step under joystick commands as they are [m/s, rad/s]."""
         targets = self._policy.step(self._gait, self.qpos, self.qvel, command, self.spec.control_dt)
-        self.command: Float[np.ndarray, "robot 3"] = command
         self._ctrl[:, self._policy.actuators] = targets
         self._advance()
 

@@ -18,19 +18,21 @@ class NavigatorConfig:
     """Learned differences of the inputs that the network sees at several sharpnesses."""
     courses: Copies = 128
     """Robots of one update."""
-    decisions: Decisions = 50
-    """Length of their courses: 5 s, in which half a turn and 2 m can be done."""
+    decisions: Decisions = 24
+    """Length of their courses: longer than it takes to turn round or to brake. Gradients of long ones explode."""
     near: Share = 0.5
     """Share of the places that are asked for within half a metre, and of headings within half a radian."""
     speed_price: NotNegative = 0.05
     """Of m/s while a heading is asked for: who turns stays where it is."""
     change_price: NotNegative = 0.02
     """Of changing the stick."""
+    effort_price: NotNegative = 0.01
+    """Of holding it: who has arrived lets it go."""
     learning_rate: Rate = 2e-3
     """Adam's step size at the start; a cosine takes it to a fiftieth."""
     updates: Count = 100
     """Updates in an iteration."""
-    iterations: Number = 60
+    iterations: Number = 40
     """Length of the run."""
     held_out: Episodes = 500
     """Held-out courses of a measurement."""

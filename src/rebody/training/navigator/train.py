@@ -56,6 +56,7 @@ class Course(eqx.Module):
     left: Float[AnyArray, "decision course"]  # distance from what was asked [m, m/s, rad]
     speed: Float[AnyArray, "decision course"]  # m/s
     change: Float[AnyArray, "decision course"]  # mean squared change of the stick
+    effort: Float[AnyArray, "decision course"]  # mean square of the stick
 
 
 @own_jax_settings()
@@ -93,7 +94,7 @@ def learn(state: RunState, config: NavigatorConfig, key: PRNGKeyArray):
 
     def loss(actor: Actor, key: PRNGKeyArray):
         told, course = drive(actor, config, config.courses, key)
-        price = course.left + config.change_price * course.change
+        price = course.left + config.change_price * course.change + config.effort_price * course.effort
         price = price + config.speed_price * jnp.where(told.slot == HEADINGS, course.speed, 0.0)
         return jnp.mean(price), {"left": jnp.mean(course.left)}
 
@@ -116,7 +117,8 @@ def drive(actor: Actor, config: NavigatorConfig, size: int, key: PRNGKeyArray) -
         left = [_far(family, seen, told) for family in NAVIGATED]
         left = jnp.select([told.slot == i for i in range(len(left))], left)
         speed = jnp.sqrt(seen.vx**2 + seen.vy**2 + 1e-12)
-        return (state, action), Course(left, speed, jnp.mean((action - held) ** 2, axis=-1))
+        change, effort = (jnp.mean(of**2, axis=-1) for of in (action - held, action))
+        return (state, action), Course(left, speed, change, effort)
 
     begun = toy.begin(still, still, still), jnp.zeros((size, len(WAYS)))
     return told, jax.lax.scan(step, begun, None, length=config.decisions)[1]
