@@ -14,7 +14,6 @@ from rebody.control.places import Places, numbers_of
 from rebody.control.sac import Actor
 from rebody.errors import RebodyError
 
-
 ANY_WALKER = "joystick"
 """The robot of a navigator: all that walk by a policy of their own."""
 

@@ -1,5 +1,6 @@
 """An agent for one robot, driven from outside: observation and reward in, joint action out."""
 
+from collections import deque
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -14,9 +15,18 @@ from rebody.agents.build import HORIZON, build_agent, check_robot_of, slot_choos
 from rebody.agents.clock import begin, decide, pass_over
 from rebody.agents.controller import TrackerController
 from rebody.agents.doubts import RewardWatch
-from rebody.agents.parts import Inference, LoadedSlots, LoadedTracker, load_inference, load_slots_of, load_tracker, tracker_of
+from rebody.agents.parts import (
+    Inference,
+    LoadedSlots,
+    LoadedTracker,
+    load_inference,
+    load_slots_of,
+    load_tracker,
+    tracker_of,
+)
 from rebody.agents.rollout import joint_action
 from rebody.bodies import RobotSpec, load_robot
+from rebody.bodies.walking.joystick import navigator_sees
 from rebody.errors import RebodyError
 from rebody.jax_settings import own_jax_settings
 from rebody.types import Belief, Subgoal
@@ -78,10 +88,12 @@ class LiveAgent:
         self._last_x: Float[np.ndarray, ""] | None = None
         self._carry: Carry | None = None
         self._watch = RewardWatch(self._inference.contract)
+        self._trail = deque[Float[np.ndarray, " nq"]](maxlen=self._spec.steps_per_decision + 1)
 
     @own_jax_settings()
     def step(self, observation: Any, reward: Any) -> Float[np.ndarray, " action"]:
-        """Joint action in [-1, 1] for one control step.
+        """Joint action in [-1, 1] for one control step; of a robot that walks already forward, sideways and turn, of
+        which `robot.walking.joystick.command` makes m/s and rad/s.
 
         `observation` is qpos with x, then qvel, in one array; `reward` is the task's, of the step that led here
         (ignored at the first), None where nothing was heard. Every 0.1 s the agent takes in a transition and decides
@@ -90,14 +102,22 @@ class LiveAgent:
         """
         observation, heard, is_whole = self._admit(observation, reward)
         qpos, qvel = np.split(observation, [self._spec.model.nq])
-        x = np.asarray(qpos[self._spec.root_addresses[0]])
+        x = np.asarray(qpos[self._spec.readout.ground[0]])
         if self._last_x is not None and is_whole:
             self._pace = self._spec.next_pace(self._pace, np.asarray(x - self._last_x))
         if self._steps % self._spec.steps_per_decision == 0:
             self._decide(qpos, heard, is_whole)
         self._steps, self._last_x, self._observation = self._steps + 1, x if is_whole else None, observation
-        pose, joints = self._spec.pose(qpos), self._spec.tracker_state(qpos, qvel, self._pace)
+        pose, joints = self._spec.pose(qpos), self._felt(qpos, qvel)
         return np.asarray(joint_action(self._controller, joints, pose, self._told, self._heard.belief))
+
+    def _felt(self, qpos: Float[np.ndarray, " nq"], qvel: Float[np.ndarray, " nv"]) -> Float[np.ndarray, " joint"]:
+        """What the tracker, or the navigator of a robot that walks already, sees of the body."""
+        if self._spec.walking is None:
+            return self._spec.tracker_state(qpos, qvel, self._pace)
+        self._trail.append(qpos)
+        moved = self._spec.observe(qpos, self._trail[0])
+        return navigator_sees(moved, self._spec.walking.joystick.measured, np).astype(np.float32)
 
     @property
     def belief(self) -> Belief:

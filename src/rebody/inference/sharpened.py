@@ -27,6 +27,8 @@ NEW = 10.0
 """What a new hypothesis pays for the past that others have explained [nats]."""
 UNLIKELIEST = -4.0
 """Log-probability that the encoder leaves every family at least: it is often too sure."""
+SUREST = -8.0
+"""Least log-probability that a belief tells of a family: beyond, its kinds would lie far from all that is learned."""
 FIRST_SHARP = 3
 """Rewards that a sharp belief needs: fewer are explained by any family, and the encoder knows what is likely."""
 
@@ -139,15 +141,13 @@ class Sharpened(eqx.Module):
         return jnp.min(in_window) > 0.5 * SURPRISED**2 * jnp.minimum(heard, self._window)
 
     def _belief(self, guess: Belief, log_share, hypotheses: Sequence[Hypotheses]) -> Belief:
-        """The likeliest hypothesis of each expert; where another family than the encoder's explains more, kinds with
-        the logits of the two exchanged.
-        """
+        """The likeliest hypothesis of each expert, and kinds that say how likely each family is by the evidence."""
         kind, choice = guess.mean[: self.decoder.kinds], self.decoder.choice
         if choice is not None:
             evidence = jnp.maximum(log_share, UNLIKELIEST) - jnp.stack([each.cost[0] for each in hypotheses])
-            first, best, logits = jnp.argmax(log_share), jnp.argmax(evidence), jnp.asarray(choice(kind))
-            wanted = logits.at[first].set(logits[best]).at[best].set(logits[first])
-            kind = kind + (wanted - logits) @ jnp.linalg.pinv(choice.weights[0])
+            wanted, logits = jnp.maximum(jax.nn.log_softmax(evidence), SUREST), jnp.asarray(choice(kind))
+            apart = (wanted - jnp.mean(wanted)) - (logits - jnp.mean(logits))
+            kind = kind + apart @ jnp.linalg.pinv(choice.weights[0])
         mean = jnp.concatenate([kind, *(each.amounts[0] for each in hypotheses)])
         return Belief(
             mean,

@@ -3,7 +3,6 @@
 import numpy as np
 from jaxtyping import Float
 
-
 from rebody.bodies.batch import RobotBatch
 from rebody.bodies.robot import RobotSpec
 from rebody.bodies.walking.joystick import WAYS, navigator_sees
@@ -54,6 +53,6 @@ class WalkingBatch(RobotBatch):
         parts = self._gait.parts()
         ends = np.cumsum([part[0].size for part in parts])
         own, *rest = np.split(value, value.shape[1] - ends[-1] + np.array([0, *ends[:-1]]), axis=1)
-        super(WalkingBatch, type(self)).state.__set__(self, own)
+        RobotBatch.state.__set__(self, own)
         for part, saved in zip(parts, rest, strict=True):
             part[:] = saved.reshape(part.shape)

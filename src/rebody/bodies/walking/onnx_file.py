@@ -139,7 +139,9 @@ def check_model(path: Path) -> None:
         raise _refused(path, f"it is no ONNX file ({_first_line(error)})") from error
     for node in _nodes(model.graph, path):
         if node.domain not in STANDARD:
-            raise _refused(path, f"its operator {node.op_type!r:.60} of domain {node.domain!r:.60} is not a standard one")
+            raise _refused(
+                path, f"its operator {node.op_type!r:.60} of domain {node.domain!r:.60} is not a standard one"
+            )
     if model.functions:
         raise _refused(path, "it defines operators of its own")
     _check_tensors(model.graph, path, onnx.TensorProto.EXTERNAL)

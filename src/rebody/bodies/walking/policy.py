@@ -146,7 +146,7 @@ class WalkingPolicy:
             phase = np.where(is_none, settings.at_rest, phase)
         return np.concatenate([np.cos(phase), np.sin(phase)], axis=-1)
 
-    def _stacked(self, heard: Float[np.ndarray, "robot step number"]) -> Float[np.ndarray, "robot number"]:
+    def _stacked(self, heard: Float[np.ndarray, "robot step number"]) -> Float[np.ndarray, "robot seen"]:
         """Term by term, each the oldest first."""
         if self._walking.history == 1:
             return heard[:, 0]
@@ -191,7 +191,9 @@ class WalkingPolicy:
         if not names:
             raise self._misfit("[policy] names no inputs, and the file says nothing of its own")
         if unknown := [name for name in names if name not in MJLAB]:
-            raise self._misfit(f"its file names an input '{unknown[0]}'; say [policy] inputs in the description's words")
+            raise self._misfit(
+                f"its file names an input '{unknown[0]}'; say [policy] inputs in the description's words"
+            )
         return tuple(MJLAB[name] for name in names)
 
     def _actuators(self, model: mujoco.MjModel, joints: Any) -> Int[np.ndarray, " joint"]:

@@ -1,4 +1,4 @@
-"""The joystick toy: a body in the plane that follows joystick commands as badly as robots do. Navigators learn on it."""
+"""The joystick toy: a body in the plane that follows a joystick as badly as robots do. Navigators learn on it."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Float, PRNGKeyArray
 
 from rebody.bodies.walking.joystick import Measured, joystick_command, navigator_sees
-from rebody.ranges import NotNegative, Share
+from rebody.ranges import NotNegative, Positive, Share
 from rebody.types import DECISION_DT, AnyArray, GlobalState, global_state
 
 Ways = Float[AnyArray, "*batch 3"]
@@ -21,8 +21,12 @@ class Walker(eqx.Module):
     measured: Measured
     gain: Ways  # share of a command that is reached
     lag: Ways  # s
+    delay: Float[AnyArray, "*batch"]  # decisions, at most 1
     across: Float[AnyArray, "*batch"]  # m/s sideways for each rad/s of turning
     bias: Ways  # drift beside the one that is measured
+    ripple: Ways  # amplitude of the gait's sines on the speeds
+    period: Float[AnyArray, "*batch"]  # s, of a stride
+    phase: Ways  # rad
 
 
 class WalkerState(eqx.Module):
@@ -31,7 +35,10 @@ class WalkerState(eqx.Module):
     x: Float[AnyArray, "*batch"]
     y: Float[AnyArray, "*batch"]
     yaw: Float[AnyArray, "*batch"]
-    speed: Ways
+    speed: Ways  # without the gait's ripple
+    moves: Ways  # with it
+    time: Float[AnyArray, "*batch"]  # s
+    command: Ways  # the last one
 
 
 @dataclass(frozen=True)
@@ -48,14 +55,20 @@ class Walkers:
     """Largest drifts that are measured; a quarter of these is not."""
     gain: tuple[NotNegative, NotNegative] = (0.5, 1.2)
     """Share of a command that is reached."""
-    lag: tuple[NotNegative, NotNegative] = (0.05, 0.5)
+    lag: tuple[NotNegative, NotNegative] = (0.05, 0.8)
     """Time constants [s]."""
+    delay: Share = 1.0
+    """Largest delay, in decisions."""
+    ripple: tuple[NotNegative, NotNegative, NotNegative] = (0.3, 0.3, 0.6)
+    """Largest amplitudes of the gait's sines on the speeds."""
+    period: tuple[Positive, Positive] = (0.3, 0.8)
+    """Of a stride [s]."""
     straight: Share = 0.15
     """Share of the robots that cannot walk sideways."""
 
     def sample(self, key: PRNGKeyArray, size: int) -> Walker:
-        """So many robots, half of them without dead bands and drift."""
-        keys = iter(jax.random.split(key, 10))
+        """So many robots, half of them without dead bands, half without drift, half without ripple."""
+        keys = iter(jax.random.split(key, 16))
 
         def between(low, high):
             return jax.random.uniform(next(keys), (size, 3), minval=jnp.asarray(low), maxval=jnp.asarray(high))
@@ -64,7 +77,7 @@ class Walkers:
         sideways = jnp.where(jax.random.bernoulli(next(keys), self.straight, (size, 1)), 0.0, 1.0)
         high = high * jnp.concatenate([jnp.ones((size, 1)), sideways, jnp.ones((size, 1))], axis=-1)
         low = -high * jnp.where(jnp.arange(3) == 0, between(*self.backwards), 1.0)
-        is_rough = jax.random.bernoulli(next(keys), 0.5, (2, size, 1))
+        is_rough = jax.random.bernoulli(next(keys), 0.5, (3, size, 1))
         dead, drift = jnp.asarray(self.dead), jnp.asarray(self.drift)
         return Walker(
             measured=Measured(
@@ -75,14 +88,19 @@ class Walkers:
             ),
             gain=between(*self.gain),
             lag=between(*self.lag),
+            delay=between(0.0, self.delay)[:, 0],
             across=between(-0.15, 0.15)[:, 0],
             bias=0.25 * between(-drift, drift),
+            ripple=is_rough[2] * between(0.0, self.ripple),
+            period=between(*self.period)[:, 0],
+            phase=between(0.0, 2 * jnp.pi),
         )
 
 
 def begin(x: AnyArray, y: AnyArray, yaw: AnyArray) -> WalkerState:
     """At rest."""
-    return WalkerState(x, y, yaw, jnp.zeros((*jnp.shape(x), 3)))
+    still = jnp.zeros((*jnp.shape(x), 3))
+    return WalkerState(x, y, yaw, still, still, jnp.zeros(jnp.shape(x)), still)
 
 
 def step(state: WalkerState, walker: Walker, action: Ways) -> WalkerState:
@@ -93,21 +111,26 @@ def step(state: WalkerState, walker: Walker, action: Ways) -> WalkerState:
     robot = walker.measured
     smooth = action * jnp.where(action > 0, robot.high, -robot.low)
     command = smooth + jax.lax.stop_gradient(joystick_command(action, robot, jnp) - smooth)
-    wanted = walker.gain * command + robot.drift + walker.bias
-    wanted = wanted.at[..., 1].add(walker.across * command[..., 2])
+    delay = walker.delay[..., None]
+    felt = (1 - delay) * command + delay * state.command
+    wanted = walker.gain * felt + robot.drift + walker.bias
+    wanted = wanted.at[..., 1].add(walker.across * felt[..., 2])
     speed = state.speed + (wanted - state.speed) * DECISION_DT / (DECISION_DT + walker.lag)
-    yaw = state.yaw + DECISION_DT * speed[..., 2]
+    time = state.time + DECISION_DT
+    wave = jnp.sin(2 * jnp.pi * (time / walker.period)[..., None] + walker.phase)
+    moves = speed + walker.ripple * wave * jnp.any(command != 0, axis=-1, keepdims=True)  # who stands has no gait
+    yaw = state.yaw + DECISION_DT * moves[..., 2]
     along = 0.5 * (state.yaw + yaw)
     cos, sin = jnp.cos(along), jnp.sin(along)
-    x = state.x + DECISION_DT * (cos * speed[..., 0] - sin * speed[..., 1])
-    y = state.y + DECISION_DT * (sin * speed[..., 0] + cos * speed[..., 1])
-    return WalkerState(x, y, yaw, speed)
+    x = state.x + DECISION_DT * (cos * moves[..., 0] - sin * moves[..., 1])
+    y = state.y + DECISION_DT * (sin * moves[..., 0] + cos * moves[..., 1])
+    return WalkerState(x, y, yaw, speed, moves, time, command)
 
 
 def observe(state: WalkerState) -> GlobalState:
     """The global state."""
     cos, sin = jnp.cos(state.yaw), jnp.sin(state.yaw)
-    ahead, left, turn = jnp.moveaxis(state.speed, -1, 0)
+    ahead, left, turn = jnp.moveaxis(state.moves, -1, 0)
     yaw = jnp.arctan2(sin, cos)
     return global_state(
         x=state.x, y=state.y, yaw=yaw, vx=cos * ahead - sin * left, vy=sin * ahead + cos * left, yaw_rate=turn

@@ -24,7 +24,7 @@ class NavigatorConfig:
     """Share of the places that are asked for within half a metre, and of headings within half a radian."""
     speed_price: NotNegative = 0.05
     """Of m/s while a heading is asked for: who turns stays where it is."""
-    change_price: NotNegative = 0.02
+    change_price: NotNegative = 0.1
     """Of changing the stick."""
     effort_price: NotNegative = 0.01
     """Of holding it: who has arrived lets it go."""
