@@ -95,7 +95,8 @@ class Inference:
         module = self.parts.module
         if not (sharpen and self.can_sharpen):
             return module.encoder, self.parts.probe
-        return Sharpened(module.encoder, module.decoder), PlaceReader(module.decoder, self.contract.families)
+        sharpened = Sharpened(module.encoder, module.decoder, tells_evidence=self.parts.high_level is None)
+        return sharpened, PlaceReader(module.decoder, self.contract.families)
 
     @own_jax_settings()
     def begin(self, state: Any, sharpen: bool = False) -> LiveBelief:

@@ -52,6 +52,9 @@ class Sharpened(eqx.Module):
 
     encoder: Encoder
     decoder: Decoder
+    tells_evidence: bool = eqx.field(static=True, default=False)
+    """Whether kinds say how likely each family is by the evidence. A policy that learned by the encoder's beliefs knows
+    those alone: for it the logits of the likeliest family and of the encoder's are exchanged."""
 
     def initial(self, shape: tuple[int, ...] = ()) -> Memory:
         """Nothing heard yet."""
@@ -145,14 +148,23 @@ class Sharpened(eqx.Module):
         kind, choice = guess.mean[: self.decoder.kinds], self.decoder.choice
         if choice is not None:
             evidence = jnp.maximum(log_share, UNLIKELIEST) - jnp.stack([each.cost[0] for each in hypotheses])
-            wanted, logits = jnp.maximum(jax.nn.log_softmax(evidence), SUREST), jnp.asarray(choice(kind))
-            apart = (wanted - jnp.mean(wanted)) - (logits - jnp.mean(logits))
-            kind = kind + apart @ jnp.linalg.pinv(choice.weights[0])
+            logits = jnp.asarray(choice(kind))
+            kind = kind + (self._wanted(logits, log_share, evidence) - logits) @ jnp.linalg.pinv(choice.weights[0])
         mean = jnp.concatenate([kind, *(each.amounts[0] for each in hypotheses)])
         return Belief(
             mean,
             jnp.concatenate([guess.variance[: self.decoder.kinds], *(each.variance[0] for each in hypotheses)]),
         )
+
+    def _wanted(
+        self, logits: Float[Array, " expert"], log_share: Float[Array, " expert"], evidence: Float[Array, " expert"]
+    ) -> Float[Array, " expert"]:
+        """What the decoder is to read from the kinds."""
+        if self.tells_evidence:
+            wanted = jnp.maximum(jax.nn.log_softmax(evidence), SUREST)
+            return wanted + jnp.mean(logits) - jnp.mean(wanted)
+        first, best = jnp.argmax(log_share), jnp.argmax(evidence)
+        return logits.at[first].set(logits[best]).at[best].set(logits[first])
 
 
 def _least(hypotheses: Sequence[Hypotheses]) -> Float[Array, ""]:

@@ -51,12 +51,12 @@ class RunState(eqx.Module):
 
 
 class Course(eqx.Module):
-    """What happened at each decision, [decision, course]."""
+    """What happened at a decision, or along a course [decision, course]."""
 
-    left: Float[AnyArray, "decision course"]  # distance from what was asked [m, m/s, rad]
-    speed: Float[AnyArray, "decision course"]  # m/s
-    change: Float[AnyArray, "decision course"]  # mean squared change of the stick
-    effort: Float[AnyArray, "decision course"]  # mean square of the stick
+    left: Float[AnyArray, "*batch"]  # distance from what was asked [m, m/s, rad]
+    speed: Float[AnyArray, "*batch"]  # m/s
+    change: Float[AnyArray, "*batch"]  # mean squared change of the stick
+    effort: Float[AnyArray, "*batch"]  # mean square of the stick
 
 
 @own_jax_settings()
