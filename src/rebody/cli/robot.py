@@ -58,7 +58,7 @@ def _walks(measured: WalkingMeasured) -> Table:
     """Commanded and reached, a row for every second command."""
     table = Table(title=f"commanded -> reached; {measured.falls} fell; lag {measured.lag_s:.2g} s")
     for way, unit in zip(measured.ways, UNITS, strict=True):
-        table.add_column(f"{way.way} [{unit}]")
+        table.add_column(escape(f"{way.way} [{unit}]"))
     rows = [
         [f"{a:+.2f} -> {b:+.2f}" for a, b in zip(way.commanded[::2], way.reached[::2], strict=True)]
         for way in measured.ways
