@@ -28,7 +28,7 @@ def own(name, *components):
     return Family(name, Quantity(name, components, "m", name), targets, floor=0.5, tolerance=0.3)
 
 
-KNOWN = SHIPPED.beside(FamilySet((own("place", "x", "y"), own("lean", "x", "pitch"))))
+KNOWN = SHIPPED.beside(FamilySet((own("spot", "x", "y"), own("lean", "x", "pitch"))))
 
 
 def run_of(fields, names, latent=3, clusters=0):
@@ -57,9 +57,9 @@ def run_of(fields, names, latent=3, clusters=0):
         run_of(("x", "vx"), ["goal", "velocity"], clusters=2),
         run_of(("x", "vx", "pitch"), ["goal", "velocity", "stand"], clusters=5),
         run_of(("x",), ["goal", "velocity"]),
-        run_of(("x", "y"), ["place", "goal"]),
+        run_of(("x", "y"), ["spot", "goal"]),
         run_of(("x", "pitch"), ["lean"]),
-        run_of(("pitch",), ["lean", "place"]),
+        run_of(("pitch",), ["lean", "spot"]),
     ],
     ids=[
         "one family, one number",

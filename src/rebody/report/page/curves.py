@@ -87,6 +87,7 @@ PANELS = (
     _mixture("the mixture's bound", "ELBO of a belief [nats]", "ELBO"),
     Panel("classifier", "cross-entropy [nats]", {"cross_entropy": "cross-entropy"}, "log"),
     Panel("short courses on the toy", "return", {"told/return": "policy that is told the task"}),
+    Panel("courses of the navigator", "left of what was asked", {"left": LEARNING}, "log"),
     Panel("subgoals reached", "error / subgoal", {"evaluation/relative error": HELD_OUT}),
     _policies("value", "discounted return", "value"),
     _policies("critics", "loss", "critic_loss", "log"),
