@@ -128,11 +128,11 @@ def test_what_is_no_set_of_families_is_refused(families):
 
 
 def test_a_target_of_several_numbers():
-    """Beside a family of one number, whose targets have a zero behind."""
+    """Beside a family of one number."""
     place = Family("place", Quantity("p", ("x", "z"), "m", "place"), (Box((1.0, 0.0), (4.0, 0.5)),), 1.0, 0.25, "plain")
     env = gymnasium.make(IDS[1], families=FamilySet((place, *DEFAULT_FAMILIES)))
     _, info = env.reset(seed=0, options={"family": "goal", "target": -3.0})
-    np.testing.assert_array_equal(info["target"], [-3.0, 0.0])
+    np.testing.assert_array_equal(info["target"], [-3.0])
     env.reset(seed=0, options={"family": "place", "target": [2.0, 0.3]})
     for _ in range(3):
         _, reward, _, _, info = env.step(env.action_space.sample())

@@ -24,7 +24,7 @@ def own(name, *components):
     return Family(name, Quantity(name, components, "m", name), targets, floor=0.5, tolerance=0.3)
 
 
-FAMILIES = SHIPPED.beside(FamilySet((own("place", "x", "y"), own("lean", "x", "pitch", "vz"))))
+FAMILIES = SHIPPED.beside(FamilySet((own("spot", "x", "y"), own("lean", "x", "pitch", "vz"))))
 
 
 def episode_of(target, family="goal", error=0.1):
@@ -65,7 +65,7 @@ def assert_drawn(path):
         [episode_of(0.0, error=0.0)],
         [episode_of(1.5, "velocity"), episode_of(-1.0, "velocity")],
         [episode_of(4.0), episode_of(-1.5, "velocity"), episode_of(0.8, "stand")],
-        [episode_of([4.0, -2.0], "place"), episode_of([-1.0, 3.0], "place")],
+        [episode_of([4.0, -2.0], "spot"), episode_of([-1.0, 3.0], "spot")],
         [episode_of([4.0, 0.5, 1.0], "lean"), episode_of(2.0)],
     ],
     ids=["many", "one", "a target of zero", "velocity", "three families", "a plane", "vectors beside numbers"],
@@ -77,7 +77,7 @@ def test_transfer(episodes, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("family", "target"), [("goal", 2.0), ("velocity", 2.0), ("place", [2.0, -1.0]), ("lean", [2.0, 0.5, 1.0])]
+    ("family", "target"), [("goal", 2.0), ("velocity", 2.0), ("spot", [2.0, -1.0]), ("lean", [2.0, 0.5, 1.0])]
 )
 def test_episode(family, target, tmp_path):
     plot_episode(episode_of(target, family), tmp_path / "episode.png")
@@ -123,10 +123,10 @@ def test_each_family_is_drawn_by_itself_while_it_counts(switched, family, wanted
 
 
 def test_a_vector_has_a_line_per_component_and_a_place_of_a_plane_is_in_it():
-    lean, place = episode_of([2.0, 0.5, 1.0], "lean"), episode_of([2.0, -1.0], "place")
+    lean, place = episode_of([2.0, 0.5, 1.0], "lean"), episode_of([2.0, -1.0], "spot")
     drawing, (in_time, in_plane) = plt.subplots(1, 2)
     draw_progress(in_time, lean, FAMILIES.named("lean"))
-    draw_progress(in_plane, place, FAMILIES.named("place"))
+    draw_progress(in_plane, place, FAMILIES.named("spot"))
     named = {line.get_label(): line for line in (*in_time.lines, *in_plane.lines)}
     plt.close(drawing)
     for i, name in enumerate(("x", "pitch", "vz")):

@@ -33,7 +33,7 @@ def families():
     boxes = (Box((-5.0, -5.0), (5.0, 5.0)),)
     return [
         Family("near", place, boxes, floor=1.0, tolerance=0.3, law="squared"),
-        Family("place", place, boxes, floor=1.0, tolerance=0.3),
+        Family("spot", place, boxes, floor=1.0, tolerance=0.3),
     ]
 """
 
@@ -73,9 +73,9 @@ def test_a_toml_file(file_of):
 
 def test_a_python_file_with_a_law_of_its_own(file_of):
     families = read_families(file_of("own.py", PYTHON))
-    assert families.names == ("near", "place", *SHIPPED.names)
+    assert families.names == ("near", "spot", *SHIPPED.names)
     assert families.named("near").law_source == LAWS["squared"].source != ""
-    assert families.named("place").law_source == ""
+    assert families.named("spot").law_source == ""
     state = global_state(x=np.zeros(2), y=np.zeros(2))
     paid = families.reward(Task(np.array([0, 1]), np.array([[3.0, 4.0], [3.0, 4.0]])), state)
     np.testing.assert_allclose(paid, [-25.0, -1.0], rtol=1e-5)
@@ -155,7 +155,7 @@ def test_a_bad_toml_file_is_refused(content, says, file_of):
         ("def families():\n    return [3]", "AttributeError|TypeError"),
         ("LAWS = [3]\ndef families():\n    return []", "TypeError"),
         (replaced('"near"', '"goal"', PYTHON), "the name 'goal' is taken by a family that ships"),
-        (replaced('"near"', '"place"', PYTHON), "none twice"),
+        (replaced('"near"', '"spot"', PYTHON), "none twice"),
         (replaced('law="squared"', 'law="cubed"', PYTHON), "law: 'cubed' is not known as it was"),
         (replaced("(5.0, 5.0)", "(5.0, -9.0)", PYTHON), "there is nothing"),
         ("raise SystemExit(3)", "SystemExit"),

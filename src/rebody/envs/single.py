@@ -55,6 +55,7 @@ class TaskEnv(gymnasium.Env):
         self._world.close()
 
     def _info(self) -> dict[str, Any]:
-        """Plain numbers; the target is an array, as long as the largest of the families has numbers."""
+        """Plain numbers; the target is an array of as many as its family has."""
         told = self._world.info()
-        return {name: values[0] if values.ndim > 1 else values.tolist()[0] for name, values in told.items()}
+        plain = {name: values[0] if values.ndim > 1 else values.tolist()[0] for name, values in told.items()}
+        return plain | {"target": plain["target"][: self._world.families.named(plain["family"]).size]}
