@@ -45,9 +45,9 @@ class Toy(eqx.Module):
     """A point mass."""
 
     @property
-    @abstractmethod
     def axes(self) -> tuple[Axis, ...]:
-        """What it moves along; along all others it stays at 0."""
+        """What it moves along, a line unless it says otherwise; along all others it stays at 0."""
+        return ("x",)
 
     @property
     def actions(self) -> int:
@@ -131,11 +131,6 @@ class PositionToy(Toy):
 
     max_step: NotNegative = 0.1  # m
 
-    @property
-    def axes(self) -> tuple[Axis, ...]:
-        """A line."""
-        return ("x",)
-
     def step(self, state: ToyState, action: Float[AnyArray, "*batch action"], key: PRNGKeyArray) -> ToyState:
         """The action is the share of the largest step."""
         wanted = state.disturbance.gain[..., None] * self._wanted(action, (self.max_step,) * len(AXES))
@@ -152,11 +147,6 @@ class MassDamper(Toy):
     mass: Positive = 1.0  # kg
     damping: NotNegative = 2.0  # N s/m
     max_force: NotNegative = 7.0  # N
-
-    @property
-    def axes(self) -> tuple[Axis, ...]:
-        """A line."""
-        return ("x",)
 
     def step(self, state: ToyState, action: Float[AnyArray, "*batch action"], key: PRNGKeyArray) -> ToyState:
         """The action is the share of the largest force along each axis."""

@@ -15,7 +15,8 @@ from rebody.tasks.family_set import sample
 from rebody.tasks.quantities import length
 from rebody.training.inference import PRESETS
 from rebody.training.inference.config import ToldConfig
-from rebody.training.inference.told import begun_with, course, initial_told, starts, update_told
+from rebody.training.inference.told import course, initial_told, starts, update_told
+from rebody.training.inference.train import load_pretrained
 from rebody.types import global_state
 
 
@@ -89,7 +90,7 @@ def test_it_goes_on_from_a_policy_of_its_size(brief):
     toy = make_toy(brief.toy)
     state = initial_told(brief, toy, jax.random.key(0))
     other = initial_told(brief, toy, jax.random.key(1)).actor
-    jax.tree.map(np.testing.assert_array_equal, begun_with(state, other, "x").actor, other)
+    jax.tree.map(np.testing.assert_array_equal, load_pretrained(other, state.actor, "x"), other)
     small = initial_told(replace(brief, sac=replace(brief.sac, hidden=(8,))), toy, jax.random.key(0)).actor
     with pytest.raises(RebodyError, match="cannot start from 'x': its networks have other sizes"):
-        begun_with(state, small, "x")
+        load_pretrained(small, state.actor, "x")

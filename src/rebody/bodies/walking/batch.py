@@ -25,9 +25,9 @@ class WalkingBatch(RobotBatch):
     def reset(self, rng, who=None):
         """As any robot; the policy forgets."""
         super().reset(rng, who)
-        ids, fresh = self._ids(who), self._policy.begin(self.size)
+        ids, fresh = self._ids(who), self._policy.begin(1)
         for mine, new in zip(self._gait.parts(), fresh.parts(), strict=True):
-            mine[ids] = new[ids]
+            mine[ids] = new
 
     def step(self, actions):
         """The joystick, until the next step."""

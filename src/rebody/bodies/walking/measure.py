@@ -30,8 +30,6 @@ class WayMeasured:
     commanded: Float[np.ndarray, " command"]
     reached: Float[np.ndarray, " command"]
     """Mean along the same way [m/s, rad/s]."""
-    beside: Float[np.ndarray, "command 3"]
-    """Mean along all ways."""
     fell: Bool[np.ndarray, " command"]
 
     def dead(self, drift: float) -> float:
@@ -98,4 +96,4 @@ def _walk(spec: RobotSpec, command: Float[np.ndarray, "robot 3"]):
 def _way(i: int, command: np.ndarray, settled: np.ndarray, fell: np.ndarray) -> WayMeasured:
     own = np.flatnonzero((command[:, i] != 0) | ~command.any(axis=1))
     own = own[np.argsort(command[own, i])]
-    return WayMeasured(WAYS[i], command[own, i], settled[own, i], settled[own], fell[own])
+    return WayMeasured(WAYS[i], command[own, i], settled[own, i], fell[own])

@@ -13,7 +13,6 @@ from jaxtyping import Float, PRNGKeyArray
 from rebody.bodies.toys import Toy
 from rebody.control.places import TaskCode, numbers_of, places_of
 from rebody.control.sac import Actor
-from rebody.errors import RebodyError
 from rebody.tasks.family_set import sample
 from rebody.training.arrival import arrival_bonus
 from rebody.training.descent import Metrics, descend
@@ -33,13 +32,6 @@ def initial_told(config: MetaConfig, toy: Toy, key: PRNGKeyArray) -> ToldState:
     places = places_of(config.families)
     actor = Actor(config.told_view.size(len(places) + numbers_of(places)), toy.actions, config.sac, key)
     return ToldState(actor, _optimiser(config).init(eqx.filter(actor, eqx.is_array)))
-
-
-def begun_with(state: ToldState, actor: Actor, name: str) -> ToldState:
-    """The state with a trained actor in place of its own; RebodyError if its sizes differ."""
-    if jax.tree.map(jnp.shape, actor) != jax.tree.map(jnp.shape, state.actor):
-        raise RebodyError(f"cannot start from '{name}': its networks have other sizes than these settings.")
-    return ToldState(actor, state.optimiser)
 
 
 @eqx.filter_jit

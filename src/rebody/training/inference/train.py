@@ -33,10 +33,10 @@ from rebody.training.inference.config import MetaConfig
 from rebody.training.inference.episodes import Episodes, collect, refresh_beliefs, roles
 from rebody.training.inference.measure import measure
 from rebody.training.inference.report import save_inference
-from rebody.training.inference.told import ToldState, begun_with, initial_told, update_told
+from rebody.training.inference.told import ToldState, initial_told, update_told
 from rebody.training.replay import store_group
 from rebody.training.run import Metrics, Run, measured
-from rebody.types import AnyArray, Transition
+from rebody.types import AnyArray, Transition, Tree
 
 LENGTH = ("wander_iterations", "joint_iterations", "policy_iterations")
 """Settings that say how long the parts of a run are, in their order."""
@@ -135,7 +135,7 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
         module = load_pretrained(parts.module, module, init_from)
         if policy is not None and parts.high_level is not None:
             policy = sac.take_over(policy, parts.high_level.actor, init_from)
-        told = begun_with(told, parts.told_policy.actor, init_from)
+        told = ToldState(load_pretrained(parts.told_policy.actor, told.actor, init_from), told.optimiser)
         if parts.mixture is not None and parts.mixture.mean.shape == clusters.prior.mean.shape:
             clusters = clusters_of(parts.mixture)
     actor = (policy or told).actor
@@ -151,8 +151,8 @@ def initial_state(config: MetaConfig, toy: Toy, key: PRNGKeyArray, init_from: st
     )
 
 
-def load_pretrained(trained: InferenceModule, fresh: InferenceModule, name: str) -> InferenceModule:
-    """The trained module in place of a fresh one; RebodyError if its sizes differ."""
+def load_pretrained(trained: Tree, fresh: Tree, name: str) -> Tree:
+    """The trained networks in place of fresh ones; RebodyError if its sizes differ."""
     if jax.tree.map(jnp.shape, trained) != jax.tree.map(jnp.shape, fresh):
         raise RebodyError(f"cannot start from '{name}': its networks have other sizes than these settings.")
     return trained
