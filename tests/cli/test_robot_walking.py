@@ -12,7 +12,15 @@ pytest.importorskip("onnx")
 def test_check_measures_what_a_policy_makes_of_commands(tmp_path, capsys):
     assert run(["robot", "check", str(write_cart(tmp_path)), "--figure", str(tmp_path / "cart.png")]) == 0
     said = capsys.readouterr().out
-    for part in ("forward [m/s]", "0 fell", "dead = [0.00, 0.00, 0.00]", "drift = [0.00, 0.00, 0.00]", "rebody run"):
+    for part in (
+        "forward [m/s]",
+        "0 fell",
+        "dead = [0.00, 0.00, 0.00]",
+        "drift = [0.00, 0.00, 0.00]",
+        "at_once = 3.0",
+        "rate = inf",
+        "rebody run",
+    ):
         assert part in said
     assert (tmp_path / "cart.png").stat().st_size > 10_000
 

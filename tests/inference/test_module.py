@@ -44,7 +44,7 @@ def evidence():
     return Evidence(
         window=Transition(states(x[:, :-1]), -np.abs(x[:, 1:] - goal), states(x[:, 1:])),
         base_task=np.broadcast_to(goal > 0, (len(goal), CONFIG.window)).astype(np.int32),
-        same_task=np.ones((len(goal), CONFIG.window, CONFIG.decoded), bool),
+        changed=np.zeros((len(goal), CONFIG.window, CONFIG.decoded), np.float32),
         previous=states(before),
         action=action,
         reward=-np.abs(after - goal),
@@ -245,36 +245,32 @@ def assert_same_slopes(module, evidence, other):
         np.testing.assert_array_equal(one, two)
 
 
-@pytest.fixture
-def changing(evidence):
-    """Beliefs of the last half of each window and the last two transitions are of another task."""
-    task_of_belief, task_of_decoded = np.arange(CONFIG.window) >= 3, np.arange(CONFIG.decoded) >= 2
-    same = np.broadcast_to(task_of_belief[:, None] == task_of_decoded, evidence.same_task.shape)
-    return eqx.tree_at(lambda e: e.same_task, evidence, same)
+def paid(evidence, reward, changed):
+    """The same, but the last transitions of each window are paid so, by a task that has changed with this chance."""
+    is_other = np.arange(CONFIG.decoded) >= 2
+    reward = np.where(is_other, reward, evidence.reward).astype("f4")
+    chance = np.broadcast_to(np.where(is_other, changed, 0.0), evidence.changed.shape).astype("f4")
+    return eqx.tree_at(lambda e: (e.reward, e.changed), evidence, (reward, chance))
 
 
-def test_a_belief_need_not_explain_what_another_task_paid(untrained, changing):
-    """Beliefs of one task are all that is left in the first window; the transitions of the other do not count."""
-    only_first = eqx.tree_at(lambda e: e.same_task, changing, changing.same_task & (np.arange(CONFIG.decoded) < 2))
-    reward = np.where(np.arange(CONFIG.decoded) < 2, changing.reward, -77.0).astype("f4")
-    assert_same_slopes(untrained, only_first, eqx.tree_at(lambda e: e.reward, only_first, reward))
-    unmasked = eqx.tree_at(lambda e: e.same_task, only_first, np.ones_like(changing.same_task))
-    apart = [
-        slopes(untrained, e, CONFIG).encoder.cell.bias
-        for e in (unmasked, eqx.tree_at(lambda e: e.reward, unmasked, reward))
-    ]
-    assert np.abs(apart[0] - apart[1]).max() > 1e-3
+def test_a_belief_need_not_explain_what_another_task_may_have_paid(untrained, evidence):
+    """Where the task may have changed, rewards that it does not explain pull at nothing; else they do."""
+
+    def pull(changed):
+        far = [slopes(untrained, paid(evidence, reward, changed), CONFIG) for reward in (-77.0, -99.0)]
+        return np.abs(far[0].encoder.cell.bias - far[1].encoder.cell.bias).max()
+
+    assert pull(0.2) < 1e-6
+    assert pull(0.0) > 1e-3
 
 
-def test_the_error_is_the_mean_over_what_beliefs_must_explain(measured, untrained, changing):
-    """Two masks that share the entries among them weigh up to the whole."""
-    everything = np.ones_like(changing.same_task)
-    squared = {}
-    for name, mask in (("same", changing.same_task), ("other", ~changing.same_task), ("all", everything)):
-        metrics = measured(untrained, eqx.tree_at(lambda e: e.same_task, changing, mask))[1]
-        squared[name] = float(metrics["reward_error"]) ** 2
-    assert squared["all"] == pytest.approx((squared["same"] + squared["other"]) / 2, rel=1e-4)
-    assert abs(squared["same"] - squared["other"]) > 1e-3
+def test_the_error_is_the_mean_over_what_beliefs_explain(measured, untrained, evidence):
+    """What another task paid is no error of theirs; where none can have, everything counts."""
+    errors = {
+        changed: float(measured(untrained, paid(evidence, -500.0, changed))[1]["reward_error"])
+        for changed in (0.0, 0.2)
+    }
+    assert errors[0.0] > 3 * errors[0.2]
 
 
 def test_the_state_is_predicted_from_the_last_belief_alone(trained, measured, evidence):

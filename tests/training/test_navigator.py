@@ -12,22 +12,29 @@ from rebody.bodies.walking import toy
 from rebody.bodies.walking.joystick import Measured
 from rebody.control.command import relative
 from rebody.training.navigator import NavigatorConfig, train_navigator
+from rebody.training.navigator.time_to_go import time_to_go
 from rebody.training.navigator.train import HEADINGS, NAVIGATED, PLACES, VELOCITIES, drive, initial_state, learn
 from rebody.types import POSE_FIELDS, Subgoal
 
 TINY = NavigatorConfig(hidden=(32, 32), projections=4, courses=32, updates=20, iterations=2, held_out=20)
 
 
-def walker(size, *, gain=1.0, lag=0.2, dead=0.0, sideways=0.4, drift=(0.0, 0.0, 0.0)):
+def walker(size, *, gain=1.0, lag=0.2, dead=0.0, sideways=0.4, drift=(0.0, 0.0, 0.0), at_once=3.0):
     """Nothing hidden about it but gain and lag."""
     high = jnp.broadcast_to(jnp.asarray([1.0, sideways, 1.0]), (size, 3))
     still = jnp.zeros((size, 3))
     return toy.Walker(
-        measured=Measured(-high * jnp.asarray([0.6, 1.0, 1.0]), high, still + dead, still + jnp.asarray(drift)),
+        measured=Measured(
+            -high * jnp.asarray([0.6, 1.0, 1.0]),
+            high,
+            still + dead,
+            still + jnp.asarray(drift),
+            jnp.full((size, 1), at_once),
+        ),
         gain=still + gain,
         lag=still + lag,
         delay=jnp.zeros(size),
-        across=jnp.zeros(size),
+        strays=jnp.zeros((size, 2)),
         bias=still,
         ripple=still,
         period=jnp.ones(size),
@@ -70,13 +77,31 @@ def test_walkers_are_drawn_in_their_ranges():
     assert drawn.delay.max() <= 1
 
 
-@pytest.mark.parametrize(("sideways", "dead"), [(0.4, 0.0), (0.4, 0.2), (0.0, 0.0)])
-def test_the_navigator_that_ships_does_what_it_is_told(sideways, dead):
+def test_a_walker_that_follows_one_way_at_a_time_is_given_less_of_each():
+    zero, full = jnp.zeros(1), jnp.asarray([[1.0, 0.0, 1.0]])
+    for at_once, share in ((3.0, 1.0), (1.5, 0.75), (1.0, 0.5)):
+        state, robot = toy.begin(zero, zero, zero), walker(1, at_once=at_once)
+        for _ in range(100):
+            state = toy.step(state, robot, full)
+        np.testing.assert_allclose(state.speed[0], [share, 0.0, share], atol=1e-4)
+
+
+def test_turning_first_pays_for_a_far_place_behind_a_slow_walker_alone():
+    """Backwards at 0.6 m/s, or half a turn at 1 rad/s and then ahead at 1 m/s."""
+    robot = walker(4)
+    places = jnp.asarray([(2.0, 0.0), (-0.6, 0.0), (-12.0, 0.0), (0.0, 0.4)])
+    np.testing.assert_allclose(time_to_go(robot, places), [2.0, 1.0, np.pi + 12.0, 1.0], rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("sideways", "dead", "at_once"), [(0.4, 0.0, 3.0), (0.4, 0.2, 3.0), (0.0, 0.0, 3.0), (0.4, 0.0, 1.0)]
+)
+def test_the_navigator_that_ships_does_what_it_is_told(sideways, dead, at_once):
     told = Subgoal(
         jnp.asarray([PLACES] * 4 + [VELOCITIES] * 3 + [HEADINGS] * 2),
         jnp.asarray([(2.5, 0), (0, 2), (-2, 0), (0.2, 0.3), (0.6, 0), (0, 0.5), (-0.5, 0), (2.5, 0), (-1, 0)], float),
     )
-    tracker, robot = load_tracker("navigator").tracker, walker(9, sideways=sideways, dead=dead)
+    tracker, robot = load_tracker("navigator").tracker, walker(9, sideways=sideways, dead=dead, at_once=at_once)
     zero = jnp.zeros(9)
     state, left = toy.begin(zero, zero, zero), []
     step = jax.jit(
@@ -98,9 +123,9 @@ def test_the_navigator_that_ships_does_what_it_is_told(sideways, dead):
 def test_learning_lowers_what_is_left():
     config = replace(TINY, updates=150)
     state = initial_state(config, jax.random.key(0))
-    _, before = drive(state.actor, config, 200, jax.random.key(5))
+    _, before, _ = drive(state.actor, config, 200, jax.random.key(5))
     actor, _, _ = learn(state, config, jax.random.key(1))
-    _, after = drive(actor, config, 200, jax.random.key(5))
+    _, after, _ = drive(actor, config, 200, jax.random.key(5))
     assert float(after.left.mean()) < 0.9 * float(before.left.mean())
 
 

@@ -4,17 +4,15 @@ import math
 from abc import abstractmethod
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from rebody.bodies import Simulation
-from rebody.control.command import Command, addressed, relative, slots_among
+from rebody.control.command import addressed, relative, slots_among, within_sight
 from rebody.control.flat import FlatPolicy
 from rebody.control.tracker import Tracker
 from rebody.inference.decoder import Decoder
 from rebody.tasks import FamilySet
-from rebody.tasks.quantities import length
 from rebody.types import AnyArray, Belief, Pose, Subgoal
 
 
@@ -54,13 +52,9 @@ class TrackerController(Controller):
         """A place is made relative to where the robot is now."""
         families = self.tracker.families
         command = relative(families, addressed(subgoal, self.slots), pose)
-        if math.isinf(self.goal_ahead):
-            return self.tracker(joints, command)
-        is_place = jnp.asarray([each.is_pose and not any(each.quantity.wraps) for each in families])[command.slot]
-        distance = length(command.value)
-        is_far = (is_place & (distance > self.goal_ahead))[..., None]
-        nearer = command.value / distance[..., None] * self.goal_ahead  # an exact sign where there is one axis
-        return self.tracker(joints, Command(command.slot, jnp.where(is_far, nearer, command.value)))
+        if not math.isinf(self.goal_ahead):
+            command = within_sight(families, command, self.goal_ahead)
+        return self.tracker(joints, command)
 
 
 class FlatController(Controller):

@@ -89,6 +89,7 @@ class LiveAgent:
         self._carry: Carry | None = None
         self._watch = RewardWatch(self._inference.contract)
         self._trail = deque[Float[np.ndarray, " nq"]](maxlen=self._spec.steps_per_decision + 1)
+        self._stick = np.zeros(self._spec.actions)
 
     @own_jax_settings()
     def step(self, observation: Any, reward: Any) -> Float[np.ndarray, " action"]:
@@ -109,7 +110,14 @@ class LiveAgent:
             self._decide(qpos, heard, is_whole)
         self._steps, self._last_x, self._observation = self._steps + 1, x if is_whole else None, observation
         pose, joints = self._spec.pose(qpos), self._felt(qpos, qvel)
-        return np.asarray(joint_action(self._controller, joints, pose, self._told, self._heard.belief))
+        return self._limited(np.asarray(joint_action(self._controller, joints, pose, self._told, self._heard.belief)))
+
+    def _limited(self, action: Float[np.ndarray, " action"]) -> Float[np.ndarray, " action"]:
+        """A joystick moves no faster than the robot can take."""
+        if self._spec.walking is None:
+            return action
+        self._stick = self._spec.walking.joystick.towards(self._stick, action, self._spec.control_dt)
+        return self._stick.astype(np.float32)
 
     def _felt(self, qpos: Float[np.ndarray, " nq"], qvel: Float[np.ndarray, " nv"]) -> Float[np.ndarray, " joint"]:
         """What the tracker, or the navigator of a robot that walks already, sees of the body."""

@@ -52,6 +52,8 @@ class _Joystick(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     turn: tuple[float, float]
     dead: tuple[float, float, float] = Joystick.dead
     drift: tuple[float, float, float] = Joystick.drift
+    at_once: float = Joystick.at_once
+    rate: float = Joystick.rate
 
 
 class _Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -160,6 +162,10 @@ def _walking(policy: _Policy, path: Path) -> Walking:
         problems.append("joystick: each way must be [low, high] around 0")
     if not all(0 <= slowest < math.inf for slowest in stick.dead):
         problems.append("joystick.dead must not be negative")
+    if not 1 <= stick.at_once <= len(ways):
+        problems.append(f"joystick.at_once must be from 1 to {len(ways)}")
+    if not stick.rate > 0:
+        problems.append("joystick.rate must be positive")
     if problems:
         raise RebodyError(f"'{path}': [policy] {'; '.join(problems)}.")
     low, high = zip(*ways, strict=True)
@@ -167,7 +173,7 @@ def _walking(policy: _Policy, path: Path) -> Walking:
         **said
         | {
             "onnx": path.parent / _with_variables(policy.onnx, path),
-            "joystick": Joystick(Box(low, high), stick.dead, stick.drift),
+            "joystick": Joystick(Box(low, high), stick.dead, stick.drift, stick.at_once, stick.rate),
             "scales": tuple(policy.scales.items()),
             "phase": policy.phase and Phase(**msgspec.structs.asdict(policy.phase)),
         }

@@ -74,5 +74,7 @@ def _joystick(measured: WalkingMeasured) -> str:
     closed = [way.way for way, slowest in zip(measured.ways, measured.dead, strict=True) if slowest == inf]
     lines = [f"dead = [{', '.join(f'{each:.2f}' for each in dead)}]"]
     lines.append(f"drift = [{', '.join(f'{round(float(each), 2) + 0.0:.2f}' for each in measured.drift)}]")
+    lines.append(f"at_once = {measured.at_once:.1f}")
+    lines.append(f"rate = {measured.rate:.1f}")
     lines += [f"{way} = [0.0, 0.0]  # what it is told is hardly followed" for way in closed]
     return "for [policy.joystick] of its file:\n  " + "\n  ".join(lines)

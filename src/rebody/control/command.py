@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 from rebody.bodies.robot import Reach
 from rebody.tasks.family import Family
 from rebody.tasks.family_set import FamilySet, fit
-from rebody.tasks.quantities import turned, wrapped_where
+from rebody.tasks.quantities import length, turned, wrapped_where
 from rebody.types import POSE_FIELDS, RATE_OF, AnyArray, Pose, Subgoal
 
 YAW = POSE_FIELDS.index("yaw")
@@ -62,6 +62,16 @@ def absolute(families: FamilySet, command: Command, pose: Pose) -> Subgoal:
     """The subgoal that a robot in this pose sees so."""
     value = _turned(families, command.slot, command.value, pose[..., YAW])
     return Subgoal(command.slot, value + _moved(families, command.slot, pose))
+
+
+def within_sight(families: FamilySet, command: Command, ahead: float | Float[AnyArray, "*batch"]) -> Command:
+    """The same, but places no farther ahead than that [m]: farther ones are shown in their direction."""
+    is_place = jnp.asarray([each.is_pose and not any(each.quantity.wraps) for each in families])[command.slot]
+    distance = length(command.value)
+    is_far = (is_place & (distance > ahead))[..., None]
+    direction = command.value / jnp.maximum(distance, 1e-9)[..., None]  # an exact sign where there is one axis
+    nearer = direction * jnp.asarray(ahead)[..., None]
+    return Command(command.slot, jnp.where(is_far, nearer, command.value))
 
 
 def after(families: FamilySet, command: Command, motion: Motion) -> Command:

@@ -6,10 +6,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optax
-from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from rebody.errors import RebodyError
-from rebody.inference.decoder import Decoder
+from rebody.inference.decoder import Decoder, Prediction
 from rebody.inference.encoder import Encoder
 from rebody.inference.inputs import apart, scaled
 from rebody.inference.prior import Prior
@@ -21,6 +21,9 @@ from rebody.types import AnyArray, GlobalState, Transition
 FARTHEST_PLACE = 1.5
 """Experts are held to places within this, in units of their fields' scales. Beyond all that a body visits a distance is
 next to constant: a cheap account of any task, which keeps an expert from ever finding the true place."""
+
+OTHER_TASKS_PAY = 2.0
+"""Rewards of a task that is not believed in may lie anywhere within this, in units of the reward scale."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +129,7 @@ class Evidence(eqx.Module):
 
     window: Transition  # [batch, time]
     base_task: Int[AnyArray, "batch time"]  # only where labels are used
-    same_task: Bool[AnyArray, "batch time decoded"]  # whether the task of the belief was on in the transition
+    changed: Float[AnyArray, "batch time decoded"]  # how likely the task has changed between belief and transition
     previous: GlobalState  # [batch, decoded]
     action: Float[AnyArray, "batch decoded action"]
     reward: Float[AnyArray, "batch decoded"]
@@ -153,9 +156,9 @@ def loss(
     latents = jnp.broadcast_to(latent[:, :, None], (*shape, config.latent))
     predicted = decoder.reward(jnp.broadcast_to(after[:, None], (*shape, after.shape[-1])), latents)
     wanted = jnp.broadcast_to(evidence.reward[:, None] / encoder.reward_scale, shape)
-    share = evidence.same_task / jnp.maximum(jnp.sum(evidence.same_task), 1)
-    reward_loss = jnp.sum(share * _weighted_negative_log_likelihood(wanted, predicted))
-    reward_error = jnp.sum(share * (wanted - predicted.expectation) ** 2)
+    own, loss_of_each = _explained(wanted, predicted, evidence.changed)
+    reward_loss = jnp.mean(loss_of_each)
+    reward_error = jnp.sum(own * (wanted - predicted.expectation) ** 2) / jnp.maximum(jnp.sum(own), 1e-6)
 
     reconstruction = reward_loss + config.state_weight * state_error
     if config.kinds:
@@ -173,11 +176,20 @@ def loss(
     return reconstruction + config.kl_weight * kl, metrics
 
 
-def _weighted_negative_log_likelihood(wanted, predicted):
-    """Likelihood with a learned sigma in place of the constant of thesis (5.2).
+def _explained(
+    wanted: Float[Array, "*batch"], predicted: Prediction, changed: Float[AnyArray, "*batch"]
+) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
+    """How likely each reward is of the believed task, and its weighted negative log-likelihood.
 
-    A constant lets the first decisions of an episode, when nothing can be known, rule the loss; weighting
-    by sigma (beta-NLL, Seitzer et al. 2022, beta = 1/2) keeps the gradient of the sure ones in bounds.
+    Nobody says when tasks change: a reward that lies far off in time may be another task's, which pays anything. The
+    likelihood decides which it is.
+
+    Sigma is learned in place of the constant of thesis (5.2). A constant lets the first decisions of an episode, when
+    nothing can be known, rule the loss; weighting by sigma (beta-NLL, Seitzer et al. 2022, beta = 1/2) keeps the
+    gradient of the sure ones in bounds.
     """
     sigma = jnp.exp(0.5 * predicted.log_variance)
-    return -jax.lax.stop_gradient(sigma) * predicted.log_likelihood(wanted)
+    own = jnp.log1p(-changed) + predicted.log_likelihood(wanted) - 0.5 * jnp.log(2 * jnp.pi)
+    other = jnp.log(jnp.maximum(changed, 1e-9)) - jnp.log(OTHER_TASKS_PAY)
+    either = jnp.logaddexp(own, other)
+    return jax.lax.stop_gradient(jnp.exp(own - either)), -jax.lax.stop_gradient(sigma) * either

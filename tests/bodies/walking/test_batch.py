@@ -21,7 +21,7 @@ def run(batch, actions, steps=100):
 def test_a_cart_goes_where_the_stick_says(cart):
     batch = simulate(cart, 4)
     assert isinstance(batch, WalkingBatch)
-    assert (batch.actions, cart.actions, cart.tracker_inputs) == (3, 3, 15)
+    assert (batch.actions, cart.actions, cart.tracker_inputs) == (3, 3, 16)
     batch.reset(np.random.default_rng(0))
     run(batch, np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]]), 100)
     x, y, *_, yaw = batch.pose().T
@@ -74,6 +74,19 @@ def test_what_a_cart_makes_of_commands_is_measured(cart):
     assert measured.falls == 0
     assert measured.lag_s < 0.5
     assert measured.dead == (0.0, 0.0, 0.0)
+    assert measured.at_once == 3.0
+    assert measured.rate == np.inf
+
+
+def test_a_slow_stick_is_part_of_the_state(tmp_path):
+    toml = CART_TOML.replace("turn = [-1.5, 1.5]", "turn = [-1.5, 1.5]\nrate = 2.0")
+    batch = simulate(load_robot(str(write_cart(tmp_path, toml))), 1)
+    batch.reset(np.random.default_rng(0))
+    begun = batch.state.copy()
+    slow = run(batch, np.ones((1, 3)), 5).observe().vx[0]  # 0.1 s, so a fifth of the way ahead
+    batch.state = begun
+    assert run(batch, np.ones((1, 3)), 5).observe().vx[0] == slow
+    assert 0 < slow < 0.3
 
 
 def test_robots_of_trackers_are_what_they_were():
@@ -86,6 +99,8 @@ def test_robots_of_trackers_are_what_they_were():
         (("forward = [-0.8, 1.0]", "forward = [0.2, 1.0]"), r"joystick: each way must be \[low, high\] around 0"),
         (("turn = [-1.5, 1.5]", "turn = [-inf, 1.5]"), r"joystick: each way must be \[low, high\] around 0"),
         (("turn = [-1.5, 1.5]", "turn = [-1.5, 1.5]\ndead = [-1.0, 0.0, 0.0]"), "joystick.dead must not be negative"),
+        (("turn = [-1.5, 1.5]", "turn = [-1.5, 1.5]\nat_once = 0.5"), "joystick.at_once must be from 1 to 3"),
+        (("turn = [-1.5, 1.5]", "turn = [-1.5, 1.5]\nrate = 0.0"), "joystick.rate must be positive"),
         (('inputs = ["command"]', 'inputs = ["command"]\nhistory = 0'), "history must be at least 1"),
         (('inputs = ["command"]', 'inputs = ["smell"]'), "Invalid enum value 'smell'"),
         (

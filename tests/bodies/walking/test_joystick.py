@@ -42,6 +42,19 @@ def test_a_way_that_is_closed_stays_closed():
     assert straight.command(np.array([0.5, -1.0, 0.5]))[1] == 0
 
 
+@pytest.mark.parametrize(("at_once", "share"), [(3.0, 1.0), (1.5, 0.75), (1.0, 0.5)])
+def test_ways_that_are_not_followed_at_once_get_less_each(at_once, share):
+    narrow = Joystick(Box((-1.0, 0.0, -1.0), (1.0, 0.0, 1.0)), at_once=at_once)
+    np.testing.assert_allclose(narrow.command(np.array([1.0, 1.0, -1.0])), [share, 0.0, -share], rtol=1e-6)
+    np.testing.assert_allclose(narrow.command(np.array([0.0, 0.0, -1.0])), [0.0, 0.0, -1.0], rtol=1e-6)
+
+
+def test_a_stick_moves_no_faster_than_its_rate():
+    slow = Joystick(STICK.limits, rate=2.0)
+    np.testing.assert_allclose(slow.towards(np.zeros(3), np.array([1.0, -0.1, 0.2]), 0.1), [0.2, -0.1, 0.2])
+    np.testing.assert_array_equal(STICK.towards(np.zeros(3), np.array([1.0, -0.1, 0.2]), 0.1), [1.0, -0.1, 0.2])
+
+
 @pytest.mark.parametrize("yaw", [0.0, np.pi / 2, -2.0])
 def test_a_navigator_sees_how_a_robot_moves_from_itself(yaw):
     ahead, left = 0.7, -0.2
@@ -53,5 +66,5 @@ def test_a_navigator_sees_how_a_robot_moves_from_itself(yaw):
     )
     seen = navigator_sees(state, STICK.measured, np)
     assert seen.shape == (NAVIGATOR_SEES,)
-    expected = [ahead, left, 0.4, -0.5, -0.3, -1.0, 1.5, 0.3, 1.0, 0.25, 0.0, 0.4, 0.1, 0.0, 0.0]
+    expected = [ahead, left, 0.4, -0.5, -0.3, -1.0, 1.5, 0.3, 1.0, 0.25, 0.0, 0.4, 0.1, 0.0, 0.0, 3.0]
     np.testing.assert_allclose(seen, expected, atol=1e-6)

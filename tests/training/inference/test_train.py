@@ -141,15 +141,20 @@ def switched(labelled):
 
 
 @pytest.mark.parametrize("window", [4, None])
-def test_a_belief_must_explain_its_own_task_alone(switched, config, window):
+def test_how_likely_a_task_has_changed_follows_from_time_alone(switched, config, window):
     families = config.families.beside(FamilySet((SPEEDS,)))
-    carried = replace(config, families=families, inference=replace(config.inference, window=window))
+    carried = replace(config, families=families, inference=replace(config.inference, window=window), switch_share=0.5)
     evidence = sample_evidence(switched, 3, carried, jax.random.key(0))
     believed, explained = unpack(evidence.window.previous.x)[2], unpack(evidence.previous.x)[2]
-    assert evidence.same_task.shape == (300, window or config.decisions, config.inference.decoded)
-    assert 0 < np.mean(evidence.same_task) < 1
-    np.testing.assert_array_equal(evidence.same_task, (believed < 5)[:, :, None] == (explained < 5)[:, None])
+    assert evidence.changed.shape == (300, window or config.decisions, config.inference.decoded)
+    apart = np.abs(believed[:, :, None] - explained[:, None])
+    np.testing.assert_allclose(evidence.changed, 1 - (1 - 0.5 / config.decisions) ** apart, atol=1e-6)
     np.testing.assert_array_equal(evidence.base_task, np.where(believed < 5, 2 * VELOCITY + 1, 2 * GOAL))
+
+
+def test_where_tasks_never_change_a_belief_must_explain_all(switched, config):
+    never = replace(config, families=config.families.beside(FamilySet((SPEEDS,))), switch_share=0.0)
+    assert not np.asarray(sample_evidence(switched, 3, never, jax.random.key(0)).changed).any()
 
 
 def test_without_a_window_the_encoder_learns_from_whole_episodes(labelled, config):

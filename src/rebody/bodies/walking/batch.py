@@ -21,17 +21,21 @@ class WalkingBatch(RobotBatch):
         super().__init__(spec, size, threads)
         self.actions, self._joystick = len(WAYS), spec.walking.joystick
         self._gait: Gait = self._policy.begin(size)
+        self._stick = np.zeros((size, self.actions))
 
     def reset(self, rng, who=None):
-        """As any robot; the policy forgets."""
+        """As any robot; the policy forgets, and the stick is let go."""
         super().reset(rng, who)
         ids, fresh = self._ids(who), self._policy.begin(1)
+        self._stick[ids] = 0.0
         for mine, new in zip(self._gait.parts(), fresh.parts(), strict=True):
             mine[ids] = new
 
     def step(self, actions):
-        """The joystick, until the next step."""
-        self.follow(self._joystick.command(np.clip(np.asarray(actions, float), -1.0, 1.0)))
+        """The joystick, until the next step; it moves no faster than the robot can take."""
+        wanted = np.clip(np.asarray(actions, float), -1.0, 1.0)
+        self._stick[:] = self._joystick.towards(self._stick, wanted, self.spec.control_dt)
+        self.follow(self._joystick.command(self._stick))
 
     def follow(self, command: Float[np.ndarray, "robot 3"]) -> None:
         """A control step under joystick commands as they are [m/s, rad/s]."""
@@ -45,14 +49,17 @@ class WalkingBatch(RobotBatch):
 
     @property
     def state(self):
-        """That of any robot, and what the policy remembers."""
-        return np.concatenate([super().state, *(part.reshape(self.size, -1) for part in self._gait.parts())], axis=1)
+        """That of any robot, the stick, and what the policy remembers."""
+        return np.concatenate([super().state, *(part.reshape(self.size, -1) for part in self._parts())], axis=1)
 
     @state.setter
     def state(self, value):
-        parts = self._gait.parts()
+        parts = self._parts()
         ends = np.cumsum([part[0].size for part in parts])
         own, *rest = np.split(value, value.shape[1] - ends[-1] + np.array([0, *ends[:-1]]), axis=1)
         RobotBatch.state.__set__(self, own)
         for part, saved in zip(parts, rest, strict=True):
             part[:] = saved.reshape(part.shape)
+
+    def _parts(self) -> list[np.ndarray]:
+        return [self._stick, *self._gait.parts()]

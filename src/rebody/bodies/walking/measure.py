@@ -5,15 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from rebody.bodies.attitude import in_heading, wrap_angle
 from rebody.bodies.robot import RobotSpec
-from rebody.bodies.walking.batch import WalkingBatch
 from rebody.bodies.walking.joystick import WAYS
+from rebody.bodies.walking.stick import SETTLES_S, fastest_stick, walk, ways_at_once
 
 SHARES = tuple(np.linspace(0.05, 1.0, 20).tolist())
 """Of a way's limits, both ends."""
-SETTLES_S, LASTS_S = 2.0, 4.0
-"""What is read begins after the first, and lasts as long as the second [s]."""
 GAIT_S = 0.3
 """A step or two, whose mean tells the speed [s]."""
 STANDS = 0.02
@@ -50,6 +47,10 @@ class WalkingMeasured:
     """How it moves while no command is given [m/s, rad/s]."""
     lag_s: float
     """Until 63 % of the fastest command ahead is reached."""
+    at_once: float
+    """The largest sum of shares of several ways' ends that is followed."""
+    rate: float
+    """The fastest movement of the stick that it takes [1/s]."""
 
     @property
     def dead(self) -> tuple[float, ...]:
@@ -70,27 +71,15 @@ def measure_walking(spec: RobotSpec) -> WalkingMeasured:
         for end in (limits.low[way], limits.high[way]):
             commands += [share * end * np.eye(len(WAYS))[way] for share in SHARES if end]
     command = np.array(commands)
-    speeds, fell = _walk(spec, command)
+    speeds, fell = walk(spec, command)
     settled = speeds[round(SETTLES_S / spec.control_dt) :].mean(axis=0)
     ahead = int(np.argmax(command[:, 0]))
     window = max(1, round(GAIT_S / spec.control_dt))
     reached = np.convolve(speeds[:, ahead, 0], np.full(window, 1 / window), "same")
     lag = np.argmax(reached >= 0.63 * settled[ahead, 0]) * spec.control_dt
-    return WalkingMeasured(tuple(_way(i, command, settled, fell) for i in range(len(WAYS))), settled[0], float(lag))
-
-
-def _walk(spec: RobotSpec, command: Float[np.ndarray, "robot 3"]):
-    """Speeds in the frame of the heading at each control step [m/s, rad/s], and who fell."""
-    batch = WalkingBatch(spec, len(command))
-    batch.reset(np.random.default_rng(0))
-    speeds, fell, before = [], np.zeros(len(command), bool), batch.pose()
-    for _ in range(round((SETTLES_S + LASTS_S) / spec.control_dt)):
-        batch.follow(command)
-        now = batch.pose()
-        moved = in_heading(now[:, :2] - before[:, :2], before[:, 5])
-        speeds.append(np.column_stack([moved, wrap_angle(now[:, 5] - before[:, 5])]) / spec.control_dt)
-        fell, before = fell | batch.fallen, now
-    return np.array(speeds), fell
+    drift, at_once = settled[0], ways_at_once(spec, settled[0])
+    ways = tuple(_way(i, command, settled, fell) for i in range(len(WAYS)))
+    return WalkingMeasured(ways, drift, float(lag), at_once, fastest_stick(spec, at_once))
 
 
 def _way(i: int, command: np.ndarray, settled: np.ndarray, fell: np.ndarray) -> WayMeasured:

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float, PRNGKeyArray
 
-from rebody.bodies.walking.joystick import Measured, joystick_command, navigator_sees
+from rebody.bodies.walking.joystick import WAYS, Measured, fitting, joystick_command, navigator_sees
 from rebody.ranges import NotNegative, Positive, Share
 from rebody.types import DECISION_DT, AnyArray, GlobalState, global_state
 
@@ -22,7 +22,7 @@ class Walker(eqx.Module):
     gain: Ways  # share of a command that is reached
     lag: Ways  # s
     delay: Float[AnyArray, "*batch"]  # decisions, at most 1
-    across: Float[AnyArray, "*batch"]  # m/s sideways for each rad/s of turning
+    strays: Float[AnyArray, "*batch 2"]  # m/s ahead for each rad/s of turning either way, and sideways
     bias: Ways  # drift beside the one that is measured
     ripple: Ways  # amplitude of the gait's sines on the speeds
     period: Float[AnyArray, "*batch"]  # s, of a stride
@@ -65,10 +65,14 @@ class Walkers:
     """Of a stride [s]."""
     straight: Share = 0.15
     """Share of the robots that cannot walk sideways."""
+    strays: tuple[NotNegative, NotNegative] = (0.4, 0.4)
+    """Largest speeds ahead and sideways for each rad/s of turning [m/s]."""
+    narrow: Share = 0.3
+    """Share of the robots that do not follow all ways at full at once."""
 
     def sample(self, key: PRNGKeyArray, size: int) -> Walker:
         """So many robots, half of them without dead bands, half without drift, half without ripple."""
-        keys = iter(jax.random.split(key, 16))
+        keys = iter(jax.random.split(key, 20))
 
         def between(low, high):
             return jax.random.uniform(next(keys), (size, 3), minval=jnp.asarray(low), maxval=jnp.asarray(high))
@@ -77,7 +81,8 @@ class Walkers:
         sideways = jnp.where(jax.random.bernoulli(next(keys), self.straight, (size, 1)), 0.0, 1.0)
         high = high * jnp.concatenate([jnp.ones((size, 1)), sideways, jnp.ones((size, 1))], axis=-1)
         low = -high * jnp.where(jnp.arange(3) == 0, between(*self.backwards), 1.0)
-        is_rough = jax.random.bernoulli(next(keys), 0.5, (3, size, 1))
+        is_rough = jax.random.bernoulli(next(keys), 0.5, (4, size, 1))
+        is_narrow = jax.random.bernoulli(next(keys), self.narrow, (size, 1))
         dead, drift = jnp.asarray(self.dead), jnp.asarray(self.drift)
         return Walker(
             measured=Measured(
@@ -85,11 +90,12 @@ class Walkers:
                 high,
                 dead=jnp.minimum(is_rough[0] * between(0 * dead, dead), 0.6 * jnp.minimum(high, -low)),
                 drift=is_rough[1] * between(-drift, drift),
+                at_once=jnp.where(is_narrow, between(1.0, 2.0)[:, :1], float(len(WAYS))),
             ),
             gain=between(*self.gain),
             lag=between(*self.lag),
             delay=between(0.0, self.delay)[:, 0],
-            across=between(-0.15, 0.15)[:, 0],
+            strays=is_rough[3] * between(-1.0, 1.0)[:, :2] * jnp.asarray(self.strays),
             bias=0.25 * between(-drift, drift),
             ripple=is_rough[2] * between(0.0, self.ripple),
             period=between(*self.period)[:, 0],
@@ -109,12 +115,14 @@ def step(state: WalkerState, walker: Walker, action: Ways) -> WalkerState:
     Derivatives are those of a joystick without rest and dead band, which have none.
     """
     robot = walker.measured
-    smooth = action * jnp.where(action > 0, robot.high, -robot.low)
+    smooth = action * fitting(jnp.abs(action), robot, jnp) * jnp.where(action > 0, robot.high, -robot.low)
     command = smooth + jax.lax.stop_gradient(joystick_command(action, robot, jnp) - smooth)
     delay = walker.delay[..., None]
     felt = (1 - delay) * command + delay * state.command
     wanted = walker.gain * felt + robot.drift + walker.bias
-    wanted = wanted.at[..., 1].add(walker.across * felt[..., 2])
+    turning = felt[..., 2]
+    wanted = wanted.at[..., 0].add(walker.strays[..., 0] * jnp.abs(turning))
+    wanted = wanted.at[..., 1].add(walker.strays[..., 1] * turning)
     speed = state.speed + (wanted - state.speed) * DECISION_DT / (DECISION_DT + walker.lag)
     time = state.time + DECISION_DT
     wave = jnp.sin(2 * jnp.pi * (time / walker.period)[..., None] + walker.phase)
@@ -137,6 +145,6 @@ def observe(state: WalkerState) -> GlobalState:
     )
 
 
-def sees(state: WalkerState, walker: Walker) -> Float[AnyArray, "*batch 15"]:
+def sees(state: WalkerState, walker: Walker) -> Float[AnyArray, "*batch 16"]:
     """What a navigator knows of it."""
     return navigator_sees(observe(state), walker.measured, jnp)

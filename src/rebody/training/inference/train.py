@@ -199,7 +199,10 @@ def update_policy(
 
 
 def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyArray) -> Evidence:
-    """Windows of stored episodes, and transitions of the same episodes that their beliefs must explain."""
+    """Windows of stored episodes, and transitions of the same episodes that their beliefs must explain.
+
+    When a task changed is told to nobody, only how often tasks do.
+    """
     keys = jax.random.split(key, 5)
     size, window = config.inference.batch_size, config.inference.window or config.decisions
     group = jax.random.randint(keys[0], (size, 1), 0, stored)
@@ -212,11 +215,11 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
     def at(time, along):
         return jax.tree.map(lambda leaf: leaf[group, episode, time], along)
 
-    believed, explained = at(seen, replay.task), at(decoded, replay.task)
+    apart = jnp.abs(seen[:, :, None] - decoded[:, None])
     return Evidence(
         window=Transition(at(seen, replay.state), at(seen, replay.reward), at(seen + 1, replay.state)),
-        base_task=config.families.base_task(believed),
-        same_task=jnp.all(believed.target[:, :, None] == explained.target[:, None], axis=-1),
+        base_task=config.families.base_task(at(seen, replay.task)),
+        changed=1 - (1 - config.switch_share / config.decisions) ** apart,
         previous=at(decoded, replay.state),
         action=at(decoded, replay.action),
         reward=at(decoded, replay.reward),

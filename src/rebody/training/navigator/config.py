@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from rebody.bodies.walking.toy import Walkers
-from rebody.ranges import Copies, Count, Decisions, Episodes, Layers, NotNegative, Number, Rate, Share
+from rebody.ranges import Copies, Count, Decisions, Episodes, Layers, NotNegative, Number, Positive, Rate, Share
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,10 @@ class NavigatorConfig:
     """Length of their courses: longer than it takes to turn round or to brake. Gradients of long ones explode."""
     near: Share = 0.5
     """Share of the places that are asked for within half a metre, and of headings within half a radian."""
+    far: Positive = 10.0
+    """Farthest place [m]. It is shown nearer, as an agent shows it."""
+    time_price: NotNegative = 1.0
+    """Of a second that the robot will still need to a place at the end of its course."""
     speed_price: NotNegative = 0.05
     """Of m/s while a heading is asked for: who turns stays where it is."""
     change_price: NotNegative = 0.1

@@ -4,7 +4,7 @@ measured of it) -> joystick.
 It is a tracker whose joints are a joystick's: one serves every robot that walks already, none of which it has seen.
 """
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import equinox as eqx
@@ -18,7 +18,7 @@ from rebody.agents.configs import TrackerSettings
 from rebody.agents.fits import ANY_WALKER
 from rebody.bodies.walking import toy
 from rebody.bodies.walking.joystick import NAVIGATED_M, NAVIGATOR_SEES, WAYS
-from rebody.control.command import relative
+from rebody.control.command import relative, within_sight
 from rebody.control.sac import Actor, SACConfig
 from rebody.control.tracker import Tracker, command_inputs
 from rebody.jax_settings import own_jax_settings
@@ -28,8 +28,9 @@ from rebody.tasks.plane import HEADING, PLACE, VELOCITY_XY
 from rebody.training.card import save
 from rebody.training.descent import descend
 from rebody.training.navigator.config import NavigatorConfig
+from rebody.training.navigator.time_to_go import time_to_go
 from rebody.training.run import Metrics, Run
-from rebody.types import POSE_FIELDS, AnyArray, Subgoal
+from rebody.types import DECISION_DT, POSE_FIELDS, AnyArray, Subgoal
 
 NAVIGATED = FamilySet(
     (
@@ -40,6 +41,8 @@ NAVIGATED = FamilySet(
 )
 """What a navigator can be told."""
 PLACES, VELOCITIES, HEADINGS = range(3)
+HELD_OUT_DECISIONS = 200
+"""Length of the courses of a measurement: time to reach a place that is far."""
 
 
 class RunState(eqx.Module):
@@ -93,25 +96,30 @@ def learn(state: RunState, config: NavigatorConfig, key: PRNGKeyArray):
     """Steps down what courses cost, with robots and subgoals drawn anew each time."""
 
     def loss(actor: Actor, key: PRNGKeyArray):
-        told, course = drive(actor, config, config.courses, key)
+        told, course, to_go = drive(actor, config, config.courses, key)
         price = course.left + config.change_price * course.change + config.effort_price * course.effort
         price = price + config.speed_price * jnp.where(told.slot == HEADINGS, course.speed, 0.0)
-        return jnp.mean(price), {"left": jnp.mean(course.left)}
+        return jnp.mean(price) + config.time_price * jnp.mean(to_go), {"left": jnp.mean(course.left)}
 
     keys = jax.random.split(key, config.updates)
     return descend(state.actor, state.optimiser, _optimiser(config), loss, keys)
 
 
-def drive(actor: Actor, config: NavigatorConfig, size: int, key: PRNGKeyArray) -> tuple[Subgoal, Course]:
-    """Robots at rest that are told one thing each, and what they make of it."""
-    walker_key, told_key = jax.random.split(key)
+def drive(
+    actor: Actor, config: NavigatorConfig, size: int, key: PRNGKeyArray
+) -> tuple[Subgoal, Course, Float[AnyArray, " course"]]:
+    """Robots at rest that are told one thing each, what they make of it, and what time they will need still [s]."""
+    walker_key, told_key, ahead_key = jax.random.split(key, 3)
     walker, told = config.walkers.sample(walker_key, size), subgoals(config, size, told_key)
+    ahead = NAVIGATED_M * jax.random.uniform(ahead_key, (size,), minval=0.5)
     tracker, still = Tracker(actor, NAVIGATED), jnp.zeros(size)
+
+    def command(state):
+        return relative(NAVIGATED, told, _pose(toy.observe(state)))
 
     def step(walk, _):
         state, held = walk
-        pose = _pose(toy.observe(state))
-        action = tracker(toy.sees(state, walker), relative(NAVIGATED, told, pose))
+        action = tracker(toy.sees(state, walker), within_sight(NAVIGATED, command(state), ahead))
         state = toy.step(state, walker, action)
         seen = toy.observe(state)
         left = [_far(family, seen, told) for family in NAVIGATED]
@@ -121,7 +129,8 @@ def drive(actor: Actor, config: NavigatorConfig, size: int, key: PRNGKeyArray) -
         return (state, action), Course(left, speed, change, effort)
 
     begun = toy.begin(still, still, still), jnp.zeros((size, len(WAYS)))
-    return told, jax.lax.scan(step, begun, None, length=config.decisions)[1]
+    (ended, _), course = jax.lax.scan(step, begun, None, length=config.decisions)
+    return told, course, jnp.where(told.slot == PLACES, time_to_go(walker, command(ended).value), 0.0)
 
 
 def subgoals(config: NavigatorConfig, size: int, key: PRNGKeyArray) -> Subgoal:
@@ -131,7 +140,7 @@ def subgoals(config: NavigatorConfig, size: int, key: PRNGKeyArray) -> Subgoal:
     is_near = jax.random.bernoulli(near_key, config.near, (size,))
     share = jax.random.uniform(where_key, (size,))
     bearing = jax.random.uniform(bearing_key, (size,), minval=-jnp.pi, maxval=jnp.pi)
-    far = jnp.select([slot == PLACES], [jnp.where(is_near, 0.5, NAVIGATED_M)], 1.5)
+    far = jnp.select([slot == PLACES], [jnp.where(is_near, 0.5, config.far)], 1.5)
     heading = jnp.where(is_near, 0.5 / jnp.pi, 1.0) * bearing
     first = jnp.where(slot == HEADINGS, heading, far * share * jnp.cos(bearing))
     second = jnp.where(slot == HEADINGS, 0.0, far * share * jnp.sin(bearing))
@@ -148,13 +157,14 @@ def _pose(state) -> Float[AnyArray, "*batch 6"]:
 
 def save_navigator(actor: Actor, config: NavigatorConfig, run: Run) -> Path:
     """Measure on robots that it was not trained on, write artifact and card."""
-    told, course = eqx.filter_jit(drive)(actor, config, config.held_out, jax.random.key(2**31 - 1))
+    longer = replace(config, decisions=HELD_OUT_DECISIONS)
+    told, course, _ = eqx.filter_jit(drive)(actor, longer, config.held_out, jax.random.key(2**31 - 1))
     ended = np.asarray(course.left[-10:]).mean(axis=0)
     rows = {}
     for i, family in enumerate(NAVIGATED):
         left = ended[np.asarray(told.slot) == i]
         says = f"{np.median(left):.3f} / {np.percentile(left, 95):.3f} {family.unit}"
-        rows[f"{family.name}: left after {config.decisions / 10:g} s, median / p95"] = says
+        rows[f"{family.name}: left after {HELD_OUT_DECISIONS * DECISION_DT:g} s, median / p95"] = says
     settings = TrackerSettings(
         robot=ANY_WALKER,
         families=NAVIGATED,
