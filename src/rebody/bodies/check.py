@@ -13,6 +13,7 @@ from rebody.bodies import RobotBatch, simulate
 from rebody.bodies.check_model import Finding, check_model
 from rebody.bodies.model import NOT_USED, carried_by
 from rebody.bodies.robot import RobotSpec
+from rebody.bodies.walking.policy import WalkingPolicy
 from rebody.errors import RebodyError
 from rebody.types import GLOBAL_FIELDS
 
@@ -29,7 +30,8 @@ Look = Callable[[RobotSpec], tuple[bool, str]]
 def check_robot(spec: RobotSpec) -> list[Finding]:
     """All that was found; RebodyError if the model cannot even be loaded."""
     findings = check_model(spec)
-    stages = ({"does nothing": _does_nothing, "moves at random": _moves_at_random}, _IN_USE)
+    runs: dict[str, Look] = {"does nothing": _does_nothing, "moves at random": _moves_at_random}
+    stages = ({} if spec.walking is None else {"policy": _policy}, runs, _IN_USE)
     for looks in stages:
         if not all(finding.is_right for finding in findings):
             return findings  # what comes would fail for the same reasons
@@ -49,6 +51,13 @@ def _finding(subject: str, look: Look, spec: RobotSpec) -> Finding:
         return Finding(subject, *look(spec))
     except (RebodyError, *NOT_USED) as error:
         return Finding(subject, False, str(error))
+
+
+def _policy(spec: RobotSpec) -> tuple[bool, str]:
+    """Of a robot that walks already."""
+    assert spec.walking is not None
+    policy = WalkingPolicy(spec.name, spec.walking, spec.model, spec.rest_qpos, spec.root_body)
+    return True, f"it moves {len(policy.actuators)} joints and hears {policy.hears}"
 
 
 def _does_nothing(spec: RobotSpec) -> tuple[bool, str]:

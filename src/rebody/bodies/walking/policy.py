@@ -59,6 +59,12 @@ class WalkingPolicy:
         self._gains = [np.asarray(own) if own else says.of_joints(key, len(joints)) for own, key in gains]
         self._check(len(joints))
 
+    @property
+    def hears(self) -> str:
+        """In words, with how many numbers each."""
+        terms = ", ".join(f"{name} {self._size(name)}" for name in self._inputs)
+        return terms if self._history == 1 else f"{terms}; {self._history} steps of each"
+
     def drive(self, model: mujoco.MjModel) -> None:
         """Make the model's motors servos of these gains, as strong as the motors, where there are any, in place."""
         stiffness, damping = self._gains
@@ -168,8 +174,8 @@ class WalkingPolicy:
             raise self._misfit("it hears a phase: say [policy.phase] frequency")
         hears, gives = self._history * self._width, self._file.actions
         if self._file.observations != hears:
-            terms = ", ".join(f"{name} {self._size(name)}" for name in self._inputs)
-            raise self._misfit(f"it hears {self._file.observations} numbers, the description says {hears} ({terms})")
+            said = f"the description says {hears} ({self.hears})"
+            raise self._misfit(f"it hears {self._file.observations} numbers, {said}")
         if any(gains is not None and len(gains) != joints for gains in self._gains):
             raise self._misfit(f"stiffness and damping must be {joints} numbers each, one for each joint")
         if gives != joints:
