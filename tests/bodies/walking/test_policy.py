@@ -182,6 +182,12 @@ def test_motors_become_servos_as_strong_as_they_were(tmp_path):
             {"metadata": {"observation_names": "command,actions", "observation_terms_history_length": "2,0"}},
             r"histories of different lengths \(1, 2\)",
         ),
+        (
+            (),
+            3,
+            {"metadata": {"observation_names": "command", "observation_terms_scale": "1;2"}},
+            "command is 3 numbers, and its scale is 2",
+        ),
         (("command",), 3, {"metadata": {"kp": "1,2,3"}}, "its file says 3 numbers of joint_stiffness for 2 joints"),
         (("phase_sine",), 3, {}, "it hears a phase"),
     ],

@@ -83,10 +83,12 @@ class FileSays:
         return [str(value).strip() for value in (values if isinstance(values, list) else [values])]
 
     def _numbers(self, key: str) -> Float[np.ndarray, " number"]:
+        """Finite ones, or none."""
         try:
-            return np.array([float(number) for number in self._list(key)])
+            numbers = np.array([float(number) for number in self._list(key)])
         except ValueError:
             return np.zeros(0)
+        return numbers if np.isfinite(numbers).all() else np.zeros(0)
 
 
 def _split(said: str) -> list[float]:
