@@ -98,7 +98,8 @@ def run(name: str, spec: RobotSpec, seconds: float) -> Times:
         taken.append((ended - begun, ended - between, ended_cpu - begun_cpu))
         body.step(action[None])
         reward = -float(np.linalg.norm(body.pose()[0, :2] - PLACE)) / max(FLOOR, float(np.linalg.norm(PLACE)))
-    return Times(*(1e3 * np.array(taken[WARM:]).T), spec.steps_per_decision)
+    both, alone, processor = 1e3 * np.array(taken[WARM:]).T
+    return Times(both, alone, processor, spec.steps_per_decision)
 
 
 if __name__ == "__main__":

@@ -176,10 +176,10 @@ class WalkingPolicy:
         if self._file.observations != hears:
             said = f"the description says {hears} ({self.hears})"
             raise self._misfit(f"it hears {self._file.observations} numbers, {said}")
-        if wrong := [name for name, scale in self._scales.items() if np.size(scale) not in (1, self._size(name))]:
-            raise self._misfit(
-                f"{wrong[0]} is {self._size(wrong[0])} numbers, and its scale is {np.size(self._scales[wrong[0]])}"
-            )
+        for name in self._inputs:
+            size, scales = self._size(name), np.size(self._scales.get(name, 1.0))
+            if scales not in (1, size):
+                raise self._misfit(f"{name} is {size} numbers, and its scale is {scales}")
         if any(gains is not None and len(gains) != joints for gains in self._gains):
             raise self._misfit(f"stiffness and damping must be {joints} numbers each, one for each joint")
         if gives != joints:
