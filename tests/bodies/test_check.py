@@ -1,14 +1,18 @@
 """`rebody robot check`: sound robots pass, and each defect is found and named."""
 
+import re
 from dataclasses import replace
 
 import mujoco
 import pytest
+from tests.walking import CART, CART_TOML, write_cart
 
 from rebody.bodies import check, load_robot
 from rebody.bodies.check import check_robot
 from rebody.bodies.robot import Fall
 from rebody.cli.main import run
+
+STANDING = 'inputs = ["command"]\naction_scale = 0.0\nstiffness = [1.0, 1.0]\ndamping = [0.1, 0.1]'
 
 
 @pytest.fixture(autouse=True)
@@ -28,6 +32,16 @@ def test_shipped_robots_are_sound(name):
 def test_a_fall_while_it_does_nothing_is_no_defect():
     says = {finding.subject: finding.says for finding in check_robot(load_robot("hopper"))}
     assert "fallen after" in says["moves at random"]
+
+
+def test_a_robot_that_walks_already_is_moved_by_its_stick(tmp_path):
+    """Its motors at random would throw it away; its policy's gains do not."""
+    pytest.importorskip("onnxruntime")
+    description = write_cart(tmp_path, CART_TOML.replace('inputs = ["command"]', STANDING))
+    motors = re.sub(r"<velocity (.*) kv=.*/>", r'<motor \1 ctrlrange="-1e9 1e9"/>', CART)
+    assert motors.count("<motor") == 2
+    (tmp_path / "cart.xml").write_text(motors)
+    assert wrong(load_robot(str(description))) == {}
 
 
 def test_a_control_step_that_does_not_fit():

@@ -78,6 +78,7 @@ def test_statistics_of_a_family_by_hand(result):
             "median_error": 0.25,
             "p95_error": np.percentile(errors, 95),
             "within_tolerance": 0.6,  # 0.25 m counts
+            "arrived_s": 1.8,  # 0.1 m more each decision
             "final_mse": np.mean(np.square(errors)),
             "ripple": 2.5,
             "base_task_right": 1.0,
@@ -86,6 +87,17 @@ def test_statistics_of_a_family_by_hand(result):
     assert summary["episodes"] == summary["families"]["goal"]["episodes"] == 5
     assert summary["fell"]["value"] == pytest.approx(0.2)
     assert summary["regret"]["value"] == pytest.approx(0.5)
+
+
+def test_a_body_arrives_when_its_error_is_within_tolerance(result):
+    """Three of five are 0.2 m from their goal, 2 m ahead, after the 12th decision; one has been there and left again,
+    one never gets there in 3 s.
+    """
+    late, early, never = ([0.0] * 11 + [1.8] * 19, [0.0] * 4 + [2.0] + [9.0] * 25, [0.0] * 30)
+    paths = [late, late, late, early, never]
+    episodes = [result(target=2.0, quantities={"x": path, "vx": [0.0] * 30}) for path in paths]
+    assert [episode.arrived_s for episode in episodes] == pytest.approx([1.2, 1.2, 1.2, 0.5, 3.0])
+    assert summarise(episodes)["families"]["goal"]["arrived_s"]["value"] == pytest.approx(1.2)
 
 
 def test_episodes_count_for_the_family_they_end_with(result):

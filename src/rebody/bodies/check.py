@@ -9,10 +9,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from rebody.bodies.batch import RobotBatch
+from rebody.bodies import RobotBatch, simulate
 from rebody.bodies.check_model import Finding, check_model
 from rebody.bodies.model import NOT_USED, carried_by
 from rebody.bodies.robot import RobotSpec
+from rebody.bodies.walking.policy import WalkingPolicy
 from rebody.errors import RebodyError
 from rebody.types import GLOBAL_FIELDS
 
@@ -29,7 +30,8 @@ Look = Callable[[RobotSpec], tuple[bool, str]]
 def check_robot(spec: RobotSpec) -> list[Finding]:
     """All that was found; RebodyError if the model cannot even be loaded."""
     findings = check_model(spec)
-    stages = ({"does nothing": _does_nothing, "moves at random": _moves_at_random}, _IN_USE)
+    runs: dict[str, Look] = {"does nothing": _does_nothing, "moves at random": _moves_at_random}
+    stages = ({} if spec.walking is None else {"policy": _policy}, runs, _IN_USE)
     for looks in stages:
         if not all(finding.is_right for finding in findings):
             return findings  # what comes would fail for the same reasons
@@ -51,6 +53,13 @@ def _finding(subject: str, look: Look, spec: RobotSpec) -> Finding:
         return Finding(subject, False, str(error))
 
 
+def _policy(spec: RobotSpec) -> tuple[bool, str]:
+    """Of a robot that walks already."""
+    assert spec.walking is not None
+    policy = WalkingPolicy(spec.name, spec.walking, spec.model, spec.rest_qpos, spec.root_body)
+    return True, f"it moves {len(policy.actuators)} joints and hears {policy.hears}"
+
+
 def _does_nothing(spec: RobotSpec) -> tuple[bool, str]:
     return _run(spec, 0.0)
 
@@ -60,11 +69,11 @@ def _moves_at_random(spec: RobotSpec) -> tuple[bool, str]:
 
 
 def _run(spec: RobotSpec, amplitude: float) -> tuple[bool, str]:
-    rng, batch = np.random.default_rng(0), RobotBatch(spec, COPIES, threads=1)
+    rng, batch = np.random.default_rng(0), simulate(spec, COPIES, threads=1)
     batch.reset(rng)
     steps, fell_at = round(SECONDS / spec.control_dt), None
     for step in range(steps):
-        batch.step(rng.uniform(-amplitude, amplitude, (batch.size, spec.model.nu)))
+        batch.step(rng.uniform(-amplitude, amplitude, (batch.size, batch.actions)))
         if fell_at is None and batch.fallen.any():
             fell_at = (step + 1) * spec.control_dt
     if not _is_sound(batch.picture_pose()):
@@ -110,19 +119,19 @@ def _pushed(spec: RobotSpec) -> tuple[bool, str]:
 
 def _speed(spec: RobotSpec, axis: int, field: str) -> float:
     """What a push along an axis reads as [m/s]."""
-    batch = RobotBatch(spec, 1, threads=1)
+    batch = simulate(spec, 1, threads=1)
     batch.reset(np.random.default_rng(0))
     batch.push(np.eye(2)[[axis]])
     for _ in range(spec.steps_per_decision):
-        batch.step(np.zeros((1, spec.model.nu)))
+        batch.step(np.zeros((1, batch.actions)))
     return float(getattr(batch.observe(), field)[0])
 
 
 def _trained(spec: RobotSpec) -> tuple[bool, str]:
     """All that training calls: what is read is finite, and a saved state continues to the last bit, as does a reset."""
-    rng, batch, twin = np.random.default_rng(0), RobotBatch(spec, COPIES, 1), RobotBatch(spec, COPIES, 1)
+    rng, batch, twin = np.random.default_rng(0), simulate(spec, COPIES, 1), simulate(spec, COPIES, 1)
     batch.reset(rng)
-    actions = rng.uniform(-1, 1, (2, spec.steps_per_decision, COPIES, spec.model.nu))
+    actions = rng.uniform(-1, 1, (2, spec.steps_per_decision, COPIES, batch.actions))
     batch.push(rng.uniform(-1, 1, COPIES))
     _act(batch, actions[0])
     twin.state = batch.state
@@ -132,7 +141,7 @@ def _trained(spec: RobotSpec) -> tuple[bool, str]:
     if not all(np.isfinite(numbers).all() for numbers in read):
         return False, "what is read of it is not finite"
     batch.reset(np.random.default_rng(1))
-    twin = RobotBatch(spec, COPIES, 1)
+    twin = simulate(spec, COPIES, 1)
     twin.reset(np.random.default_rng(1))
     if not np.array_equal(_act(batch, actions[0]), _act(twin, actions[0])):
         return False, "after a reset it does not move as a new one: the model keeps some of its state"

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from rebody.bodies import load_robot
 from rebody.bodies.check import check_robot
-from rebody.bodies.walking.measure import WalkingMeasured, measure_walking
+from rebody.bodies.walking.measure import STANDS, WalkingMeasured, measure_walking
 from rebody.cli.output import PICTURES, check_output
 from rebody.errors import RebodyError
 from rebody.report.walking import UNITS, plot_walking
@@ -69,12 +69,13 @@ def _walks(measured: WalkingMeasured) -> Table:
 
 
 def _joystick(measured: WalkingMeasured) -> str:
-    """What the description's [policy.joystick] is to say; a way that is never followed is closed."""
+    """What the description's [policy.joystick] is to say: what hardly drifts stands still; a way that is never followed
+    is closed.
+    """
     dead = [0.0 if slowest == inf else slowest for slowest in measured.dead]
     closed = [way.way for way, slowest in zip(measured.ways, measured.dead, strict=True) if slowest == inf]
-    lines = [f"dead = [{', '.join(f'{each:.2f}' for each in dead)}]"]
-    lines.append(f"drift = [{', '.join(f'{round(float(each), 2) + 0.0:.2f}' for each in measured.drift)}]")
-    lines.append(f"at_once = {measured.at_once:.1f}")
-    lines.append(f"rate = {measured.rate:.1f}")
+    drift = [float(each) if abs(each) >= STANDS else 0.0 for each in measured.drift]
+    lines = [f"{name} = [{', '.join(f'{each:.2f}' for each in of)}]" for name, of in (("dead", dead), ("drift", drift))]
+    lines += [f"at_once = {measured.at_once:.1f}", f"rate = {measured.rate:.1f}"]
     lines += [f"{way} = [0.0, 0.0]  # what it is told is hardly followed" for way in closed]
     return "for [policy.joystick] of its file:\n  " + "\n  ".join(lines)

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 
 from rebody.tasks import Family, FamilySet
 from rebody.tasks.figures import settled
+from rebody.types import DECISION_DT
 
 Vector = list[float]
 
@@ -72,6 +73,20 @@ class EpisodeResult:
         """How far what the last family settles on is from its target, after each decision [m, m/s, rad]."""
         family = self.last_family
         return family.quantity.distance(settled(family, self._series(family)), np.array(self.active_target[-1]))
+
+    @property
+    def arrived_s(self) -> float:
+        """From when the last task is given until the error is within tolerance for the first time [s]."""
+        return self.seconds_until(self.missed() <= self.last_family.tolerance)
+
+    def seconds_until(self, holds: Bool[np.ndarray, " time"]) -> float:
+        """From when the last task is given to the first decision after which something holds; what never does counts
+        as long as the episode lasts on [s].
+        """
+        active = list(zip(self.active_family, self.active_target, strict=True))
+        after = holds[active.index(active[-1]) :]
+        decisions = np.argmax(after) + 1 if after.any() else len(after)
+        return float(decisions * DECISION_DT)
 
     def base_task_right(self) -> Bool[np.ndarray, " time"]:
         """Whether family and direction are read rightly from the belief after each decision."""

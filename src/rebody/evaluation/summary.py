@@ -34,6 +34,7 @@ def _of_family(episodes: Sequence[EpisodeResult]) -> dict[str, Any]:
         "median_error": with_interval(errors, np.median, tasks),
         "p95_error": with_interval(errors, percentile_95, tasks),
         "within_tolerance": with_interval(errors <= episodes[0].last_family.tolerance, np.mean, tasks),
+        "arrived_s": with_interval([episode.arrived_s for episode in episodes], np.median, tasks),
         "final_mse": with_interval([episode.final_squared_error for episode in episodes], np.mean, tasks),
         "ripple": with_interval([episode.ripple_m_s for episode in episodes], np.median, tasks),
         "base_task_right": with_interval([episode.base_task_right()[-1] for episode in episodes], np.mean, tasks),

@@ -11,6 +11,7 @@ FIGURES = (
     ("median error", "median_error"),
     ("95th percentile", "p95_error"),
     ("within tolerance", "within_tolerance"),
+    (r"within tolerance after \[s]", "arrived_s"),
     (r"ripple \[m/s]", "ripple"),
 )
 """Of each family: what it is called, and where it stands in the summary."""

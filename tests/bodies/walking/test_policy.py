@@ -132,6 +132,28 @@ def test_what_mjlab_writes_is_read_from_the_file(moving, tmp_path):
     np.testing.assert_array_equal(model.actuator_biasprm[:, :3], [[0.0, -30.0, -2.0], [0.0, -20.0, -1.0]])
 
 
+def test_what_holosoma_writes_is_read_too(tmp_path):
+    metadata = {"dof_names": json.dumps(["right", "left"]), "kp": "[20, 30]", "kd": "[1, 2]"}
+    policy = policy_of(tmp_path, ("command",), 3, metadata=metadata)
+    model = mujoco.MjModel.from_xml_string(CART)
+    policy.drive(model)
+    np.testing.assert_array_equal(policy.actuators, [1, 0])
+    np.testing.assert_array_equal(model.actuator_gainprm[:, 0], [30.0, 20.0])
+    np.testing.assert_array_equal(model.actuator_biasprm[:, 2], [-2.0, -1.0])
+
+
+def test_motors_become_servos_as_strong_as_they_were(tmp_path):
+    """A motor's range limits its torque; a servo's, which was an angle, does not. Twice is as once."""
+    motors = CART.replace('<velocity name="left" joint="left" kv="2"', '<motor name="left" joint="left" gear="-3"')
+    model = mujoco.MjModel.from_xml_string(motors)
+    for _ in range(2):
+        policy_of(tmp_path, ("command",), 3, stiffness=(1e6, 1e6), damping=(1.0, 1.0)).drive(model)
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 1.0
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.qfrc_actuator[[6, 7]], [90.0, 1e6])
+
+
 @pytest.mark.parametrize(
     ("inputs", "numbers", "settings", "says"),
     [
@@ -148,6 +170,26 @@ def test_what_mjlab_writes_is_read_from_the_file(moving, tmp_path):
         (("command",), 3, {"stiffness": (1.0,)}, "must be 2 numbers each"),
         ((), 3, {}, "names no inputs"),
         ((), 3, {"metadata": {"observation_names": "base_lin_vel,height_scan"}}, "names an input 'height_scan'"),
+        (
+            (),
+            3,
+            {"metadata": {"observation_names": "command", "observation_terms_clip": "-1;1"}},
+            "its file clips single inputs",
+        ),
+        (
+            (),
+            6,
+            {"metadata": {"observation_names": "command,actions", "observation_terms_history_length": "2,0"}},
+            r"histories of different lengths \(1, 2\)",
+        ),
+        (
+            (),
+            3,
+            {"metadata": {"observation_names": "command", "observation_terms_scale": "1;2"}},
+            "command is 3 numbers, and its scale is 2",
+        ),
+        (("command",), 3, {"metadata": {"kp": "1,2,3"}}, "its file says 3 numbers of joint_stiffness for 2 joints"),
+        (("phase_sine",), 3, {}, "it hears a phase"),
     ],
 )
 def test_what_does_not_fit(tmp_path, inputs, numbers, settings, says):

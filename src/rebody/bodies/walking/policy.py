@@ -1,6 +1,5 @@
 """A walking policy on one robot's model: what it hears of joint positions and velocities, and where it moves joints."""
 
-import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,21 +8,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from rebody.bodies.attitude import inverse, product
+from rebody.bodies.walking.metadata import FileSays
 from rebody.bodies.walking.onnx_file import OnnxPolicy
 from rebody.bodies.walking.settings import Term, Walking
 from rebody.errors import RebodyError, did_you_mean
 
-MJLAB: dict[str, Term] = {
-    "base_lin_vel": "linear_velocity",
-    "base_ang_vel": "angular_velocity",
-    "projected_gravity": "gravity",
-    "joint_pos": "joint_positions",
-    "joint_vel": "joint_velocities",
-    "actions": "last_action",
-    "command": "command",
-    "velocity_commands": "command",
-}
-"""What mjlab and Isaac Lab call them in a file's metadata."""
 NO_COMMAND = 0.01
 """Commands shorter than this are none [m/s, rad/s]."""
 
@@ -50,28 +39,40 @@ class WalkingPolicy:
         self._robot, self._walking, self._file = robot, walking, OnnxPolicy(walking.onnx)
         self._root = int(model.jnt_qposadr[model.body_jntadr[root]]), int(model.jnt_dofadr[model.body_jntadr[root]])
         self._imu = self._frame(model, root)
-        said = self._file.metadata
-        self._inputs = walking.inputs or self._named(_listed(said.get("observation_names")))
-        actuators = self._actuators(model, walking.joints or _listed(said.get("joint_names")))
+        says = FileSays(self._file.metadata, self._misfit)
+        self._inputs = walking.inputs or says.inputs
+        if not self._inputs:
+            raise self._misfit("[policy] names no inputs, and the file says nothing of its own")
+        self._scales = dict(walking.scales) if walking.inputs else says.scales | dict(walking.scales)
+        self._history = walking.history if walking.inputs else says.history or walking.history
+        actuators = self._actuators(model, walking.joints or says.joints)
         joints = model.actuator_trnid[actuators, 0]
         self.actuators: Int[np.ndarray, " joint"] = actuators
         self._at, self._moves = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         self._unheard = self._indices([model.joint(i).name for i in joints], walking.unheard)
         self._rest, self._high = rest[self._at], float(rest[self._root[0] + 2])
-        default = _numbers(said.get("default_joint_pos"))
-        self._centre = self._rest if default is None or len(default) != len(joints) else default
-        scale = walking.action_scale if walking.action_scale is not None else _numbers(said.get("action_scale"))
-        self._scale = np.ones(len(joints)) if scale is None else np.broadcast_to(np.asarray(scale), len(joints))
+        default, scale = says.of_joints("default_joint_pos", len(joints)), walking.action_scale
+        self._centre = self._rest if default is None else default
+        scale = says.of_joints("action_scale", len(joints)) if scale is None else scale
+        self._scale = np.broadcast_to(1.0 if scale is None else np.asarray(scale), len(joints))
         gains = ((walking.stiffness, "joint_stiffness"), (walking.damping, "joint_damping"))
-        self._gains = [np.asarray(own or (_numbers(said.get(key)) if key in said else [])) for own, key in gains]
+        self._gains = [np.asarray(own) if own else says.of_joints(key, len(joints)) for own, key in gains]
         self._check(len(joints))
 
+    @property
+    def hears(self) -> str:
+        """In words, with how many numbers each."""
+        terms = ", ".join(f"{name} {self._size(name)}" for name in self._inputs)
+        return terms if self._history == 1 else f"{terms}; {self._history} steps of each"
+
     def drive(self, model: mujoco.MjModel) -> None:
-        """Make the model's motors servos of these gains, where there are any, in place."""
-        if not all(len(gains) for gains in self._gains):
-            return
+        """Make the model's motors servos of these gains, as strong as the motors, where there are any, in place."""
         stiffness, damping = self._gains
-        for row, p, d in zip(self.actuators, stiffness, damping, strict=True):
+        if stiffness is None or damping is None:
+            return
+        for row, p, d in zip(self.actuators.tolist(), stiffness, damping, strict=True):
+            if model.actuator_biastype[row] == mujoco.mjtBias.mjBIAS_NONE:
+                _limit_force(model, row)
             model.actuator_gaintype[row] = mujoco.mjtGain.mjGAIN_FIXED
             model.actuator_biastype[row] = mujoco.mjtBias.mjBIAS_AFFINE
             model.actuator_gainprm[row, 0] = p
@@ -85,7 +86,7 @@ class WalkingPolicy:
         return Gait(
             np.zeros((robots, len(self._at)), np.float32),
             np.tile(offsets, (robots, 1)),
-            np.zeros((robots, self._walking.history, self._width)),
+            np.zeros((robots, self._history, self._width)),
             self._file.initial(robots),
         )
 
@@ -116,19 +117,23 @@ class WalkingPolicy:
         positions, velocities = qpos[:, self._at] - self._centre, qvel[:, self._moves].copy()
         positions[:, self._unheard] = velocities[:, self._unheard] = 0.0
         linear, angular, gravity = self._felt(qpos, qvel)
+        phase = self._clock(gait.phase, command)
         terms = {
             "linear_velocity": linear,
             "angular_velocity": angular,
             "gravity": gravity,
             "command": command,
+            "command_linear": command[:, :2],
+            "command_turn": command[:, 2:],
             "joint_positions": positions,
             "joint_velocities": velocities,
             "last_action": gait.last_action,
-            "phase": self._clock(gait.phase, command),
+            "phase": np.concatenate([np.cos(phase), np.sin(phase)], axis=-1),
+            "phase_cosine": np.cos(phase),
+            "phase_sine": np.sin(phase),
             "height": qpos[:, [self._root[0] + 2]],
         }
-        scales = dict(self._walking.scales)
-        return [scales.get(name, 1.0) * terms[name] for name in self._inputs]
+        return [self._scales.get(name, 1.0) * terms[name] for name in self._inputs]
 
     def _felt(self, qpos, qvel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """By the IMU, in its own frame: its velocity, how it turns, and which way is down."""
@@ -139,16 +144,17 @@ class WalkingPolicy:
         down = _turned(inverse(attitude), np.broadcast_to([0.0, 0.0, -1.0], linear.shape))
         return _turned(inverse(turn), linear), _turned(inverse(turn), turning), _turned(inverse(turn), down)
 
-    def _clock(self, phase, command):
+    def _clock(self, phase, command) -> Float[np.ndarray, "robot leg"]:
+        """What the clock shows."""
         settings = self._walking.phase
-        if settings is not None and settings.at_rest is not None:
-            is_none = np.linalg.norm(command, axis=-1, keepdims=True) < NO_COMMAND
-            phase = np.where(is_none, settings.at_rest, phase)
-        return np.concatenate([np.cos(phase), np.sin(phase)], axis=-1)
+        if settings is None or settings.at_rest is None:
+            return phase
+        is_none = np.linalg.norm(command, axis=-1, keepdims=True) < NO_COMMAND
+        return np.where(is_none, settings.at_rest, phase)
 
     def _stacked(self, heard: Float[np.ndarray, "robot step number"]) -> Float[np.ndarray, "robot seen"]:
         """Term by term, each the oldest first."""
-        if self._walking.history == 1:
+        if self._history == 1:
             return heard[:, 0]
         ends = np.cumsum([self._size(name) for name in self._inputs])[:-1]
         return np.concatenate([part.reshape(len(heard), -1) for part in np.split(heard, ends, axis=-1)], axis=-1)
@@ -156,20 +162,25 @@ class WalkingPolicy:
     def _size(self, name: Term) -> int:
         joints, legs = len(self._at), 0 if self._walking.phase is None else len(self._walking.phase.offsets)
         of_joints = dict.fromkeys(("joint_positions", "joint_velocities", "last_action"), joints)
-        return ({"phase": 2 * legs, "height": 1} | of_joints).get(name, 3)
+        of_parts = {"command_linear": 2, "command_turn": 1, "phase": 2 * legs, "phase_cosine": legs, "phase_sine": legs}
+        return ({"height": 1} | of_parts | of_joints).get(name, 3)
 
     @property
     def _width(self) -> int:
         return sum(self._size(name) for name in self._inputs)
 
     def _check(self, joints: int) -> None:
-        if "phase" in self._inputs and self._walking.phase is None:
+        if self._walking.phase is None and any(name.startswith("phase") for name in self._inputs):
             raise self._misfit("it hears a phase: say [policy.phase] frequency")
-        hears, gives = self._walking.history * self._width, self._file.actions
+        hears, gives = self._history * self._width, self._file.actions
         if self._file.observations != hears:
-            terms = ", ".join(f"{name} {self._size(name)}" for name in self._inputs)
-            raise self._misfit(f"it hears {self._file.observations} numbers, the description says {hears} ({terms})")
-        if any(len(gains) not in (0, joints) for gains in self._gains):
+            said = f"the description says {hears} ({self.hears})"
+            raise self._misfit(f"it hears {self._file.observations} numbers, {said}")
+        for name in self._inputs:
+            size, scales = self._size(name), np.size(self._scales.get(name, 1.0))
+            if scales not in (1, size):
+                raise self._misfit(f"{name} is {size} numbers, and its scale is {scales}")
+        if any(gains is not None and len(gains) != joints for gains in self._gains):
             raise self._misfit(f"stiffness and damping must be {joints} numbers each, one for each joint")
         if gives != joints:
             raise self._misfit(f"it gives {gives} numbers for {joints} joints")
@@ -186,15 +197,6 @@ class WalkingPolicy:
         if model.site_bodyid[site] != root:
             raise self._misfit(f"site '{self._walking.imu}' is not on the body that floats freely")
         return model.site_pos[site].copy(), model.site_quat[site].copy()
-
-    def _named(self, names: list[str]) -> tuple[Term, ...]:
-        if not names:
-            raise self._misfit("[policy] names no inputs, and the file says nothing of its own")
-        if unknown := [name for name in names if name not in MJLAB]:
-            raise self._misfit(
-                f"its file names an input '{unknown[0]}'; say [policy] inputs in the description's words"
-            )
-        return tuple(MJLAB[name] for name in names)
 
     def _actuators(self, model: mujoco.MjModel, joints: Any) -> Int[np.ndarray, " joint"]:
         """Of each joint, in the policy's order."""
@@ -213,26 +215,17 @@ class WalkingPolicy:
         return RebodyError(f"robot '{self._robot}': its walking policy '{self._walking.onnx}' does not fit: {why}.")
 
 
+def _limit_force(model: mujoco.MjModel, row: int) -> None:
+    """Of a motor: what limits its input limits its force, in the joint's own units, before its input is an angle."""
+    strength = model.actuator_gainprm[row, 0] * model.actuator_gear[row, 0]
+    if model.actuator_ctrllimited[row]:
+        model.actuator_forcerange[row] = np.sort(strength * model.actuator_ctrlrange[row])
+        model.actuator_forcelimited[row] = True
+    model.actuator_gear[row, 0] = 1.0
+
+
 def _turned(attitude: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Vectors turned by attitudes."""
     attitude = np.broadcast_to(attitude, (*vector.shape[:-1], 4))
     pure = np.concatenate([np.zeros_like(vector[..., :1]), vector], axis=-1)
     return product(product(attitude, pure), inverse(attitude))[..., 1:]
-
-
-def _listed(said: str | None) -> list[str]:
-    """A list of names as metadata have it: JSON or with commas."""
-    if not said:
-        return []
-    try:
-        names = json.loads(said)
-    except ValueError:
-        names = said.split(",")
-    return [str(name).strip() for name in names] if isinstance(names, list) else []
-
-
-def _numbers(said: str | None) -> Float[np.ndarray, " number"] | None:
-    try:
-        return np.array([float(number) for number in _listed(said)]) if said else None
-    except ValueError:
-        return None

@@ -11,15 +11,19 @@ Term = Literal[
     "angular_velocity",
     "gravity",
     "command",
+    "command_linear",
+    "command_turn",
     "joint_positions",
     "joint_velocities",
     "last_action",
     "phase",
+    "phase_cosine",
+    "phase_sine",
     "height",
 ]
 """What a walking policy may hear, in the field's words: velocities of the IMU in its own frame [m/s, rad/s], the
-world's (0, 0, -1) in it, the joystick command, joints relative to the rest pose [rad, rad/s], its last action, cosines
-then sines of the gait's phases, and the root's height above the floor [m]."""
+world's (0, 0, -1) in it, the joystick command or its two parts, joints relative to the rest pose [rad, rad/s], its last
+action, cosines then sines of the gait's phases or either, and the root's height above the floor [m]."""
 
 
 @dataclass(frozen=True)
