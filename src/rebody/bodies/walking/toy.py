@@ -95,7 +95,7 @@ class Walkers:
             gain=between(*self.gain),
             lag=between(*self.lag),
             delay=between(0.0, self.delay)[:, 0],
-            strays=is_rough[3] * between(-1.0, 1.0)[:, :2] * jnp.asarray(self.strays),
+            strays=is_rough[3] * between((-0.5, -1.0, 0.0), 1.0)[:, :2] * jnp.asarray(self.strays),
             bias=0.25 * between(-drift, drift),
             ripple=is_rough[2] * between(0.0, self.ripple),
             period=between(*self.period)[:, 0],
@@ -103,10 +103,10 @@ class Walkers:
         )
 
 
-def begin(x: AnyArray, y: AnyArray, yaw: AnyArray) -> WalkerState:
-    """At rest."""
+def begin(x: AnyArray, y: AnyArray, yaw: AnyArray, moves: Ways | float = 0.0) -> WalkerState:
+    """At rest, or in motion, with the stick let go."""
     still = jnp.zeros((*jnp.shape(x), 3))
-    return WalkerState(x, y, yaw, still, still, jnp.zeros(jnp.shape(x)), still)
+    return WalkerState(x, y, yaw, still + moves, still + moves, jnp.zeros(jnp.shape(x)), still)
 
 
 def step(state: WalkerState, walker: Walker, action: Ways) -> WalkerState:

@@ -36,7 +36,7 @@ class NavigatorConfig:
     """Adam's step size at the start; a cosine takes it to a fiftieth."""
     updates: Count = 100
     """Updates in an iteration."""
-    iterations: Number = 40
+    iterations: Number = 60
     """Length of the run."""
     held_out: Episodes = 500
     """Held-out courses of a measurement."""

@@ -108,8 +108,9 @@ def learn(state: RunState, config: NavigatorConfig, key: PRNGKeyArray):
 def drive(
     actor: Actor, config: NavigatorConfig, size: int, key: PRNGKeyArray
 ) -> tuple[Subgoal, Course, Float[AnyArray, " course"]]:
-    """Robots at rest that are told one thing each, what they make of it, and what time they will need still [s]."""
-    walker_key, told_key, ahead_key = jax.random.split(key, 3)
+    """Robots, half of them at rest, that are told one thing each, what they make of it, and what time they will need
+    still [s]."""
+    walker_key, told_key, ahead_key, moves_key = jax.random.split(key, 4)
     walker, told = config.walkers.sample(walker_key, size), subgoals(config, size, told_key)
     ahead = NAVIGATED_M * jax.random.uniform(ahead_key, (size,), minval=0.5)
     tracker, still = Tracker(actor, NAVIGATED), jnp.zeros(size)
@@ -128,7 +129,9 @@ def drive(
         change, effort = (jnp.mean(of**2, axis=-1) for of in (action - held, action))
         return (state, action), Course(left, speed, change, effort)
 
-    begun = toy.begin(still, still, still), jnp.zeros((size, len(WAYS)))
+    share = jax.random.uniform(moves_key, (size, len(WAYS)), minval=-1.0) * (jnp.arange(size) % 2)[:, None]
+    moves = jnp.abs(share) * jnp.where(share > 0, walker.measured.high, walker.measured.low)
+    begun = toy.begin(still, still, still, moves), jnp.zeros((size, len(WAYS)))
     (ended, _), course = jax.lax.scan(step, begun, None, length=config.decisions)
     return told, course, jnp.where(told.slot == PLACES, time_to_go(walker, command(ended).value), 0.0)
 
