@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rebody.evaluation.logs import COLUMNS, BeliefOverTime
-from rebody.report.figures import components, is_plane, set_plane
+from rebody.report.figures import components, set_plane
+from rebody.report.plane import is_plane
 from rebody.report.style import SHADES, TRUTH, as_text, figure
 from rebody.tasks import Family
 from rebody.types import global_state
