@@ -16,7 +16,7 @@ from rich.console import Console
 
 from rebody.agents.belief import Reading
 from rebody.agents.parts import load_inference, load_tracker
-from rebody.bodies import load_robot
+from rebody.bodies import RobotSpec, load_robot
 from rebody.bodies.camera import Camera
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.listening import listen
@@ -43,7 +43,7 @@ class Run:
     """One robot's episode."""
 
     title: str
-    trial: Trial
+    robot: RobotSpec
     episode: EpisodeResult
     poses: list[np.ndarray]
     readings: list[Reading]
@@ -76,11 +76,12 @@ def main() -> None:
 
 def run_of(name: str, title: str, place: tuple[float, ...], seconds: float) -> Run:
     """One episode of `reuse`."""
+    robot = load_robot(str(WALKING / f"{name}.toml"))
     trial = Trial(
         agent="reuse",
         inference=load_inference("plane"),
         families=SHIPPED,
-        robot=load_robot(str(WALKING / f"{name}.toml")),
+        robot=robot,
         tracker=load_tracker("navigator"),
         slots_by="belief",
         sharpen=True,
@@ -89,7 +90,7 @@ def run_of(name: str, title: str, place: tuple[float, ...], seconds: float) -> R
     episode, poses = record(trial, TaskSpec("place", place))
     readings = listen(trial.inference, episode, sharpen=True)
     assert readings is not None
-    return Run(title, trial, episode, poses, readings)
+    return Run(title, robot, episode, poses, readings)
 
 
 def arrival(run: Run) -> str:
@@ -106,10 +107,10 @@ def draw(panel, run: Run, until: int | None) -> None:
 
 def frames(runs: list[Run], decisions: int) -> Iterator[np.ndarray]:
     """Robots above, maps below."""
-    cameras = [Camera(r.trial.robot.model, SIDE, SIDE, r.trial.robot.root_body, around=True) for r in runs]
+    cameras = [Camera(r.robot.model, SIDE, SIDE, r.robot.root_body, around=True) for r in runs]
     for decision in range(0, decisions, EVERY):
         robots = [
-            camera.picture(run.poses[decision * run.trial.robot.steps_per_decision], poles_of(run.episode, decision))
+            camera.picture(run.poses[decision * run.robot.steps_per_decision], poles_of(run.episode, decision))
             for camera, run in zip(cameras, runs, strict=True)
         ]
         size = (len(runs) * SIDE / 100, 1.15 * SIDE / 100)

@@ -86,7 +86,9 @@ def _missed(axes: Axes, episode: EpisodeResult) -> None:
     axes.plot(episode.time_s, np.maximum(off, SMALLEST), ".", color=BELIEF, ms=4, label="belief")
     axes.plot(episode.time_s, np.maximum(episode.missed(), SMALLEST), color=MOTION, label="robot")
     axes.axhline(family.tolerance, color="0.7", lw=1.0, ls=":", label="tolerance")
-    axes.set(yscale="log", xlabel="time [s]", ylabel=f"distance from the {family.name} [{family.unit}]")
+    axes.set(
+        yscale="log", xlabel="time [s]", ylabel=f"{family.quantity.label}: distance from the target [{family.unit}]"
+    )
 
 
 def _chances(axes: Axes, episode: EpisodeResult, readings: Sequence[Reading] | None) -> None:

@@ -16,8 +16,8 @@ from rebody.types import POSE_FIELDS, RATE_FIELDS
 
 SMALLEST_M = 3.0
 """Width of a map at least."""
-ELLIPSES_S = (0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
-"""When the belief's ellipse is drawn on the map of a whole episode [s]."""
+AT = (4, 9, 14, 19, 29, 49)
+"""Decisions whose belief has an ellipse on the map of a whole episode: after 0.5, 1, 1.5, 2, 3 and 5 s."""
 ARROW, PER_SPEED = 0.12, 0.2
 """Lengths of the arrow of a heading, and of 1 m/s, as shares of a map."""
 INNER = 0.25
@@ -111,9 +111,14 @@ def _believed(axes: Axes, episode: EpisodeResult, readings: Sequence[Reading] | 
         span = float(np.ptp(axes.get_xlim()))
         target = np.array(episode.inferred_target[now])
         _target(axes, families[now], target, path[now], span, BELIEF, "believed")
-    times = {round(10 * each) - 1 for each in ELLIPSES_S} if is_whole else {now}
-    for i in sorted(times & {*chosen}):
-        if readings is not None:
+    if readings is not None:
+        draw_ellipses(axes, readings, chosen, AT if is_whole else (now,))
+
+
+def draw_ellipses(axes: Axes, readings: Sequence[Reading], chosen: Sequence[int], at: Sequence[int] = AT) -> None:
+    """Two standard deviations of believed targets of two numbers, those chosen at some decisions."""
+    for i in at:
+        if i in chosen:
             axes.add_artist(_ellipse(readings[i]))
 
 
