@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from rebody.agents.belief import Reading
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.results import Results
-from rebody.report.plane import draw_circle, draw_map, is_heading, is_place, is_plane, path_of
+from rebody.report.plane import draw_circle, draw_map, draw_rim, draw_turn, is_heading, is_place, is_plane, path_of
 from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, SHADES, TASKS, TRUTH, as_text, figure
 from rebody.tasks import Family
 from rebody.tasks.family_set import fit
@@ -174,11 +174,16 @@ def draw_trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:
             axes.plot(*settled(family, episode.reached).T, color=colour, lw=1.2)
             axes.plot(*target, "o", color=colour, ms=4)
             continue
+        if is_heading(family):
+            draw_turn(axes, np.array(episode.time_s), episode.reached[:, 0], target[0], colour)
+            continue
         for i, number in enumerate(target):
             axes.plot(episode.time_s, episode.reached[:, i], color=colour, alpha=SHADES[i % len(SHADES)], lw=1.2)
             axes.plot(episode.time_s[-1], number, MARKERS[i % len(MARKERS)], color=colour, ms=4, clip_on=False)
     if is_plane(family):
         set_plane(axes, family)
+    elif is_heading(family):
+        draw_rim(axes, episodes[0].time_s[-1])
     else:
         axes.set(xlabel="time [s]", ylabel=f"{family.name} [{family.unit}]")
     axes.set(title=f"{family.name}: robot (lines), targets (dots)")

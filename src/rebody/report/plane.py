@@ -1,6 +1,7 @@
 """Pictures of the plane: paths with what is believed on the way, velocities, and headings on a circle."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -167,17 +168,35 @@ def draw_circle(
     until: int | None = None,
 ) -> None:
     """Headings as directions, time from within to the rim: the robot's, the hidden and the believed one."""
-    radius = INNER + (1 - INNER) * time_s / time_s[-1]
-    turn = np.linspace(0, 2 * np.pi, 120)
-    for each in (INNER, 1.0):
-        axes.plot(each * np.cos(turn), each * np.sin(turn), color="0.85", lw=1.0, zorder=0)
+    radius = _radius(time_s)
     axes.plot(radius * np.cos(wanted), radius * np.sin(wanted), "--", color=TRUTH, label="hidden target")
     across, up = radius * np.cos(read), radius * np.sin(read)
     axes.plot(across[:until], up[:until], ".", color=BELIEF, ms=4, label="read from the belief")
     across, up = radius * np.cos(reached), radius * np.sin(reached)
     axes.plot(across[:until], up[:until], color=MOTION, lw=1.5, label="robot")
+    draw_rim(axes, float(time_s[-1]))
+
+
+def draw_turn(
+    axes: Axes, time_s: Float[np.ndarray, " time"], reached: Float[np.ndarray, " time"], target: float, colour: Any
+) -> None:
+    """One of many on the same circle: a line, and its target on the rim."""
+    radius = _radius(time_s)
+    axes.plot(radius * np.cos(reached), radius * np.sin(reached), color=colour, lw=1.2)
+    axes.plot(1.04 * np.cos(target), 1.04 * np.sin(target), "o", color=colour, ms=4)
+
+
+def _radius(time_s: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
+    return INNER + (1 - INNER) * time_s / time_s[-1]
+
+
+def draw_rim(axes: Axes, seconds: float) -> None:
+    """Where time begins and ends, and what directions are called."""
+    turn = np.linspace(0, 2 * np.pi, 120)
+    for each in (INNER, 1.0):
+        axes.plot(each * np.cos(turn), each * np.sin(turn), color="0.85", lw=1.0, zorder=0)
     for angle, name in ((0.0, "0"), (np.pi / 2, "π/2"), (np.pi, "π"), (-np.pi / 2, "-π/2")):
         axes.text(1.12 * np.cos(angle), 1.12 * np.sin(angle), name, ha="center", va="center", fontsize=8)
     axes.set(xlim=(-1.25, 1.25), ylim=(-1.25, 1.25), aspect="equal", xticks=[], yticks=[])
-    axes.set_xlabel(f"heading [rad]; time from within (0 s) to the rim ({time_s[-1]:g} s)")
+    axes.set_xlabel(f"heading [rad]; time from within (0 s) to the rim ({seconds:g} s)")
     axes.spines[:].set_visible(False)
