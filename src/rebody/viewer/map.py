@@ -153,7 +153,7 @@ class Frame:
         ends = [(middle - self.span / 2, middle + self.span / 2) for middle in self.middle]
         for axis, (low, high) in enumerate(ends):
             for i in range(math.ceil(low / step), math.floor(high / step) + 1):
-                place = (i * step, i * step)
+                place = (float(i * step), float(i * step))
                 at = self.px(place)[axis]
                 line = f'x1="{at:.1f}" x2="{at:.1f}" y1="0" y2="{PX}"'
                 line = line if axis == 0 else f'y1="{at:.1f}" y2="{at:.1f}" x1="0" x2="{PX}"'

@@ -81,7 +81,7 @@ class Mark:
         shade = colours.rgb(colour)
         self._place = scene.add_frame(f"{WORLD}/{name}", show_axes=False, visible=False)
         # behind the body's path, the higher the farther, so that none hides another; in the plane the thinner
-        behind, radius = (0.0, 0.045 / height) if in_plane else (0.4 * height, 0.025)
+        behind, radius = (0.0, 0.02 / height) if in_plane else (0.4 * height, 0.025)
         middle, top = (0.0, behind, height / 2), (0.0, behind, height)
         scene.add_cylinder(f"{WORLD}/{name}/pole", radius, height, color=shade, position=middle)
         self._pole_label = scene.add_label(f"{WORLD}/{name}/label", name, position=top, anchor="bottom-center")
