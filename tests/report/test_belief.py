@@ -44,7 +44,7 @@ def run_of(fields, names, latent=3, clusters=0):
             for direction in family.direction_names
         }
         target = tuple(2.0 + 0.1 * np.arange(believed.size))
-        return Reading(believed.name, target, base_tasks, shares, Belief(mean, np.ones(latent)))
+        return Reading(believed.name, target, np.eye(len(target)), base_tasks, shares, Belief(mean, np.ones(latent)))
 
     decisions = Decisions(time, {field: np.sin(time) for field in fields}, -np.ones(TIME))
     return BeliefOverTime("tiny", families, decisions, [reading(i) for i in range(TIME)], believed=TIME)
@@ -81,6 +81,6 @@ def test_drawn_whole(run, tmp_path):
 def test_a_family_that_was_never_believed(tmp_path):
     run = run_of(("x", "vx"), ["goal", "velocity"])
     for i, reading in enumerate(run.readings):
-        run.readings[i] = Reading("goal", (2.0,), reading.base_tasks, {}, reading.latent)
+        run.readings[i] = Reading("goal", (2.0,), np.eye(1), reading.base_tasks, {}, reading.latent)
     plot_beliefs(run, tmp_path / "belief.png")
     assert_drawn(tmp_path / "belief.png")

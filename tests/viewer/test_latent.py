@@ -26,7 +26,7 @@ def active(mixture) -> list[int]:
 
 def reading(mean: list[float], responsibilities: dict[int, float], family: str = "goal") -> Reading:
     latent = Belief(np.array(mean), np.full(len(mean), 0.04))
-    return Reading(family, (1.0,), {("goal", "front"): 1.0, ("goal", "back"): 0.0}, responsibilities, latent)
+    return Reading(family, (1.0,), np.eye(1), {("goal", "front"): 1.0, ("goal", "back"): 0.0}, responsibilities, latent)
 
 
 def test_a_component_is_where_its_points_are(mixture):

@@ -21,7 +21,7 @@ def moment(i: int, hidden: TaskSpec, believed: str) -> Moment:
     front = 0.7 if believed == "goal" else 0.2
     base_tasks = {("goal", "front"): front, ("goal", "back"): 1 - front}
     target = (10.0 + i, 20.0 + i) if believed == "place" else (10.0 + i,)
-    reading = Reading(believed, target, base_tasks, {}, latent)
+    reading = Reading(believed, target, np.eye(len(target)), base_tasks, {}, latent)
     reached = {"goal": (1.0 * i,), "velocity": (2.0 * i,), "stand": (0.0,), "place": (1.0 * i, 3.0 * i)}
     return Moment(0.1 * (i + 1), hidden, reached, -1.0, reading, (), None)
 

@@ -123,7 +123,7 @@ def test_targets_end_where_the_module_or_the_robot_ends(trial):
     for task, fits in {
         TaskSpec("velocity", (-3.7,)): TaskSpec("velocity", (-3.0,)),
         TaskSpec("goal", (4.0,)): TaskSpec("goal", (4.0,)),
-        TaskSpec("stand", (1.0,)): TaskSpec("goal", (5.0,)),
+        TaskSpec("stand", (1.0,)): TaskSpec("goal", (3.0,)),
         TaskSpec("lean", (-5.0, 0.5)): TaskSpec("lean", (-4.0, 0.5)),
     }.items():
         assert fitting(trial, task) == fits

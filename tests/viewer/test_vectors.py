@@ -89,6 +89,7 @@ def test_a_slider_per_component(own_trial):
     ("asked", "start", "along"),
     [
         ({"x": 9.0, "y": 1.0}, (EDGE_M, 0, 0), (ARROW_M, 0, 0)),
+        ({"x": 1.0, "y": -4.0}, (0, -EDGE_M, 0), (0, -ARROW_M, 0)),
         ({"vx": 2.0}, (0, 0, 0), (2 * ARROW_M, 0, 0)),
         ({"vx": 2.0, "vy": -1.0}, (0, 0, 0), (2 * ARROW_M, -ARROW_M, 0)),
         ({"vz": 2.0}, (0, 0, 0), (0, 0, 2 * ARROW_M)),
@@ -98,7 +99,7 @@ def test_a_slider_per_component(own_trial):
     ],
 )
 def test_an_arrow_says_what_is_asked(asked, start, along):
-    begins, goes_on = _arrow(asked, 1.0)
+    begins, goes_on = _arrow(asked, np.array([1.0, 1.0]))
     np.testing.assert_allclose(begins, start, atol=1e-9)
     np.testing.assert_allclose(goes_on, along, atol=1e-9)
 

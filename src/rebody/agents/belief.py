@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from rebody import inputs
 from rebody.agents.doubts import RECENT_S, RewardWatch
@@ -15,6 +16,7 @@ from rebody.bodies.robot import wrap_angle
 from rebody.errors import RebodyError
 from rebody.inference import Encoder
 from rebody.inference.contract import Contract
+from rebody.inference.covariance import believed_covariances, heard_covariances
 from rebody.inference.mixture.padded import MixturePrior
 from rebody.inference.probe import Probe
 from rebody.inference.reader import PlaceReader
@@ -31,6 +33,8 @@ class Reading:
     """The likeliest."""
     target: tuple[float, ...]
     """In the units of the family's quantity (m, m/s, rad)."""
+    covariance: Float[np.ndarray, "size size"]
+    """Of the target, in the same units, by what was heard."""
     base_tasks: dict[tuple[str, str], float]
     """Probability of each base task that the module knows: a family and a direction, such as ("goal", "front")."""
     responsibilities: dict[int, float]
@@ -63,7 +67,8 @@ class LiveBelief:
         """Decisions in which a reward was heard and believed."""
         self._decision, self._watch = 0, RewardWatch(contract)
         self._fields = contract.fields
-        self._memory, self._previous = inferrer.initial(), _global_state(self._fields, state, None, "at the start")
+        self._memory: Any = inferrer.initial()
+        self._previous = _global_state(self._fields, state, None, "at the start")
         self._reading = self._read(inferrer.prior())
 
     @property
@@ -110,6 +115,7 @@ class LiveBelief:
         return Reading(
             family=family.name,
             target=tuple(target[: family.size].tolist()),
+            covariance=np.asarray(self._covariances(belief)[which]),
             base_tasks={
                 (each.name, direction): float(share * chance)
                 for each, share, spread in zip(families, probabilities, spreads, strict=True)
@@ -118,6 +124,12 @@ class LiveBelief:
             responsibilities={int(k): float(shares[k]) for k in clusters},
             latent=jax.tree.map(np.asarray, belief),
         )
+
+    def _covariances(self, belief: Belief) -> list[Float[jax.Array, "size size"]]:
+        """Of each family's target."""
+        if isinstance(self._inferrer, Sharpened):
+            return heard_covariances(self._inferrer, self._memory)
+        return believed_covariances(self._reader, belief)
 
 
 def _global_state(fields: tuple[str, ...], given: Any, previous: GlobalState | None, where: str) -> GlobalState:

@@ -105,15 +105,16 @@ def rollout_on_robot(
     starts: Starts,
     on_frame: OnFrame | None = None,
     clock: Clock | None = None,
+    make: Callable[[RobotSpec, int], Simulation] = simulate,
 ) -> Episodes:
     """Episodes on robots from x = 0 at rest; `tasks` are the active ones, [time, episode], and the reset noise of each
     episode is drawn from its number in `starts`.
 
     Nothing ends early: a fallen robot lies there and keeps scoring. `on_frame` is called at every control step.
-    What is returned is 0.1 s apart, whatever the clock.
+    What is returned is 0.1 s apart, whatever the clock. `make` gives the robots another body than their own.
     """
     decisions, size = tasks.family.shape
-    body = simulate(spec, size)
+    body = make(spec, size)
     for episode, seed in enumerate(starts):
         body.reset(np.random.default_rng(seed), np.arange(size) == episode)
     drive = Drive(agent, controller, body, families, clock)

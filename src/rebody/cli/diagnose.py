@@ -11,7 +11,7 @@ from rebody.cli.output import PICTURES, check_output
 from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import save_results
-from rebody.evaluation.diagnosis import LADDER, diagnose, diagnosis_tables
+from rebody.evaluation.diagnosis import EXACT, LADDER, WALKING_LADDER, diagnose, diagnosis_tables
 from rebody.ranges import Seeds
 from rebody.report.diagnosis import plot_diagnosis
 from rebody.tasks.task_file import read_tasks, task_entries
@@ -47,11 +47,11 @@ class Diagnose:
         for table in diagnosis_tables(diagnosis):
             console.print(table)
         if self.out is not None:
-            for agent, results in diagnosis.results.items():
-                save_results(results, self.out / f"{agent}.json")
+            for agent in diagnosis.results.keys() - {EXACT}:  # its agent is an oracle, but on no robot
+                save_results(diagnosis.results[agent], self.out / f"{agent}.json")
         if self.figure is not None:
             plot_diagnosis(diagnosis, self.figure)
 
 
 def _doing(agent: str) -> str:
-    return f"{list(LADDER).index(agent) + 1} of {len(LADDER)}: {agent}"
+    return f"{list(WALKING_LADDER).index(agent) + 1} of {len(WALKING_LADDER)}: {agent}"

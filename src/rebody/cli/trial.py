@@ -71,10 +71,11 @@ class TrialOptions:
         """Load the parts; RebodyError where an option makes no sense or a part cannot be had."""
         check_agent(self.agent)
         families = read_families(self.families)  # first: artifacts may name its laws
-        inference, robot, parts = load_inference(self.inference), None, {}
+        inference, robot = load_inference(self.inference), None
+        parts: dict[str, Any] = {"tracker": None}
         if self.robot != POINT_MASS:
             robot = load_robot(self.robot)
-            parts = self._parts(inference, robot)
+            parts |= self._parts(inference, robot)
         return Trial(
             agent=self.agent,
             robot=robot,
@@ -86,7 +87,7 @@ class TrialOptions:
             stride=self._fixed_stride(),
             horizon=self.horizon or (1 if self.thesis else HORIZON),
             thesis=self.thesis,
-            **{"tracker": None} | parts,
+            **parts,
         )
 
     def _parts(self, inference: Inference, spec: RobotSpec) -> dict[str, Any]:

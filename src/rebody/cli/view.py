@@ -13,10 +13,13 @@ from rebody.errors import RebodyError
 from rebody.evaluation.trial import POINT_MASS, Trial, check_trial
 from rebody.ranges import Port
 from rebody.store import shipped_artifacts
-from rebody.tasks.task_file import parse_task
+from rebody.tasks.task_file import TaskSpec, parse_task
 
 if TYPE_CHECKING:
     from rebody.viewer.controls import Choice
+
+FIRST = TaskSpec("goal", (4.0,))
+"""Hidden at first where the module knows it."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +31,8 @@ class View:
     inference: str = TrialOptions.inference
     """Inference artifact that is heard first."""
     agent: Annotated[str, tyro.conf.arg(help=AGENT_HELP)] = TrialOptions.agent
-    task: str = "goal=4"
-    """Hidden task at first: FAMILY=TARGET, such as goal=-9."""
+    task: str | None = None
+    """Hidden task at first: FAMILY=TARGET, such as goal=-9, or place=3,-2; default is one that the module knows."""
     tracker: str | None = None
     """Tracker artifact of that robot; default tracker-ROBOT."""
     flat: str | None = None
@@ -47,13 +50,14 @@ class View:
             from rebody.viewer.controls import Choice, Offered
             from rebody.viewer.page import Page
             from rebody.viewer.server import serving
+            from rebody.viewer.session import fitting
         except ModuleNotFoundError as error:
             if error.name not in ("viser", "mjviser"):
                 raise
             raise RebodyError("the live page needs more packages: install with `pip install 'rebody[view]'`.") from None
         choice = Choice(self.robot, self.inference, self.agent)
         trial = self._load(choice)
-        task = parse_task(self.task, trial.in_play)
+        task = fitting(trial, FIRST) if self.task is None else parse_task(self.task, trial.in_play)
         check_trial(trial, [task])
         modules = [name for name, kind in shipped_artifacts() if kind == "inference"]
         offered = Offered(_with([POINT_MASS, *shipped_robots()], self.robot), _with(modules, self.inference))

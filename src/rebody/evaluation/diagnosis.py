@@ -22,13 +22,22 @@ from rebody.types import DECISION_DT
 LADDER = {
     "oracle": "the tracker, told the target",
     "bayes": "+ finding out, with the exact posterior",
-    "readout": "+ the module, its target read linearly",
+    "readout": "+ the module, its target read from the belief",
     "reuse": "+ the high level and the bridge",
 }
 """Agents that differ by one part each, in the order in which parts are added."""
+EXACT = "exact"
+WALKING_LADDER = {
+    EXACT: "the navigator, told the target",
+    **LADDER,
+    "oracle": "+ the walking policy",
+    "reuse": "+ the imagined policy and the bridge",
+}
+"""Of a robot that walks already; the first agent is the oracle on a body that goes exactly as its joystick says."""
 IDLE = "idle"
 """Stands beside the ladder: what nobody's part could lose."""
 PARTS = ("wrong base task", "wrong slot", "target read", "high level", "tracker")
+WALKING_PARTS = (*PARTS[:-1], "navigator", "walking policy")
 SLOT_FROM = 20
 """Decisions after which base task and slot count as right or wrong."""
 _LAST = round(LAST_S / DECISION_DT)
@@ -66,6 +75,11 @@ class Diagnosis:
     """By agent: `reuse` at least, which is enough to see where it stands at its end."""
 
     @property
+    def ladder(self) -> dict[str, str]:
+        """Its agents, in the order in which parts are added."""
+        return WALKING_LADDER if EXACT in self.results else LADDER
+
+    @property
     def is_complete(self) -> bool:
         """Whether every agent of the ladder is there, so that it shows what each part costs."""
         return self.results.keys() >= LADDER.keys()
@@ -78,8 +92,9 @@ class Diagnosis:
     def culprits(self) -> Counter[str]:
         """How many episodes of `reuse` are out of tolerance by which part's fault."""
         episodes = self.results["reuse"].episodes
-        failed = [e for e in episodes if e.final_error > e.last_family.tolerance]
-        return Counter(shares_of(episode).culprit for episode in failed)
+        exact = self.results[EXACT].episodes if EXACT in self.results else [None] * len(episodes)
+        both = [(e, x) for e, x in zip(episodes, exact, strict=True) if e.final_error > e.last_family.tolerance]
+        return Counter(_culprit(episode, on_exact) for episode, on_exact in both)
 
     def base_task_known(self) -> float:
         """Share of episodes of `reuse` whose base task is read rightly once something is known."""
@@ -94,13 +109,18 @@ class Diagnosis:
 
     def lost(self) -> dict[str, float]:
         """Mean return that each part costs; they add up to the return of `reuse`."""
-        returns = [float(np.mean([e.return_ for e in self.results[agent].episodes])) for agent in LADDER]
-        return {agent: after - before for agent, before, after in zip(LADDER, [0.0, *returns], returns, strict=False)}
+        returns = [float(np.mean([e.return_ for e in self.results[agent].episodes])) for agent in self.ladder]
+        return {
+            agent: after - before for agent, before, after in zip(self.ladder, [0.0, *returns], returns, strict=False)
+        }
 
 
 def diagnose(trial: Trial, specs: list[TaskSpec], seeds: int, tell: Callable[[str], None]) -> Diagnosis:
     """Every agent of the ladder on every task; `tell` hears which one is next. RebodyError as `evaluate`."""
     results, yardsticks = {}, None
+    if trial.robot is not None and trial.robot.walking is not None:
+        tell(EXACT)
+        results[EXACT] = evaluate(replace(trial, agent="oracle", goes_exactly=True), specs, seeds)
     for agent in LADDER:
         tell(agent)
         yardsticks = yardsticks or take_yardsticks(trial, specs, seeds)
@@ -123,6 +143,14 @@ def _conditions(results: Results) -> Hashable:
     tasks = tuple((e.task, e.seed, len(e.time_s)) for e in results.episodes)
     parts = (results.robot, results.inference, results.tracker, *sorted(results.frozen.values()))
     return parts, results.stride, results.horizon, tasks
+
+
+def _culprit(episode: EpisodeResult, on_exact: EpisodeResult | None) -> str:
+    """Between subgoal and motion it is the navigator's fault where a body that follows it exactly is off, too."""
+    culprit = shares_of(episode).culprit
+    if culprit != "tracker" or on_exact is None:
+        return culprit
+    return "navigator" if on_exact.final_error > episode.last_family.tolerance else "walking policy"
 
 
 def shares_of(episode: EpisodeResult) -> Shares:
@@ -160,7 +188,7 @@ def _ladder(diagnosis: Diagnosis) -> Table:
     table.add_column("fell \\[%]", justify="right")
     table.add_column("return that it costs", justify="right")
     lost = diagnosis.lost()
-    for agent, what in (LADDER | {IDLE: "idle: stands still"}).items():
+    for agent, what in (diagnosis.ladder | {IDLE: "idle: stands still"}).items():
         if agent not in diagnosis.results:
             continue
         summary = diagnosis.results[agent].summary
@@ -190,7 +218,8 @@ def _standing(diagnosis: Diagnosis) -> Table:
 def _failures(diagnosis: Diagnosis) -> Table:
     table = Table(title="episodes of `reuse` out of tolerance, by the part to blame", title_justify="left")
     culprits = diagnosis.culprits()
-    for part in PARTS:
+    parts = WALKING_PARTS if EXACT in diagnosis.results else PARTS
+    for part in parts:
         table.add_column(part, justify="right")
-    table.add_row(*(str(culprits[part]) for part in PARTS))
+    table.add_row(*(str(culprits[part]) for part in parts))
     return table

@@ -19,6 +19,8 @@ from rebody.agents.parts import (
     Inference,
 )
 from rebody.agents.rollout import Episodes, Starts, rollout_on_robot, rollout_on_toy
+from rebody.bodies import simulate
+from rebody.bodies.walking.exact import ExactWalkers
 from rebody.control.command import slots_among
 from rebody.errors import RebodyError
 from rebody.evaluation.results import Results, episode_results
@@ -165,7 +167,10 @@ def run_trial(trial: Trial, agent: Agent, tasks: Task, starts: Starts) -> Episod
         episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, families)
     else:
         clock, controller = _clock(trial), trial_controller(trial)
-        episodes = rollout_on_robot(agent, controller, trial.robot, tasks, families, starts, trial.on_frame, clock)
+        make = ExactWalkers if trial.goes_exactly else simulate
+        episodes = rollout_on_robot(
+            agent, controller, trial.robot, tasks, families, starts, trial.on_frame, clock, make
+        )
     return jax.tree.map(np.asarray, episodes)
 
 

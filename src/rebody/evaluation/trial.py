@@ -67,6 +67,9 @@ class Trial:
     """The encoder ticks once per stride (6.3.3)."""
     step_predictor: LoadedStepPredictor | None = None
     """In thesis mode it chooses each stride anew, in place of `stride` (6.4.3)."""
+    goes_exactly: bool = False
+    """Whether a robot that walks already goes exactly as its joystick says (`ExactWalkers`), to tell the navigator's
+    share from the walking policy's."""
     on_frame: OnFrame | None = None
     """Called at every control step of a robot, to film it."""
 

@@ -7,9 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rebody.evaluation.logs import COLUMNS, BeliefOverTime
-from rebody.report.figures import components, is_plane, set_plane
+from rebody.report.figures import components, set_plane
+from rebody.report.plane import draw_ellipses, is_plane
 from rebody.report.style import SHADES, TRUTH, as_text, figure
 from rebody.tasks import Family
+from rebody.tasks.figures import settled
 from rebody.types import global_state
 
 OUTLIERS = 5
@@ -50,7 +52,9 @@ def _reached(axes: Axes, run: BeliefOverTime, family: Family) -> None:
     is_believed = run.believes(family)
     believed, label = run.targets(family)[is_believed], f"believed {family.name}"
     if is_plane(family):
+        reached = settled(family, reached)  # a gait would scribble all over
         axes.plot(*believed.T, ".", color=family.colour, label=label)
+        draw_ellipses(axes, run.readings, np.flatnonzero(is_believed).tolist())
         axes.plot(*reached.T, color=TRUTH, lw=1.2, label="robot")
         set_plane(axes, family, *(_ends(family, reached[:, i], believed[:, i]) for i in (0, 1)))
     else:

@@ -1,12 +1,13 @@
 """The picture of a diagnosis."""
 
 from pathlib import Path
+from textwrap import fill
 
-from rebody.evaluation.diagnosis import LADDER, Diagnosis
+from rebody.evaluation.diagnosis import EXACT, LADDER, Diagnosis
 from rebody.report.figures import draw_errors
 from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, as_text, figure
 
-COLOURS = dict(zip((*LADDER, "idle"), (ORACLE, IDLE, BELIEF, MOTION, "#9a9a9a"), strict=True))
+COLOURS = dict(zip((*LADDER, "idle", EXACT), (ORACLE, IDLE, BELIEF, MOTION, "#9a9a9a", "#588b8b"), strict=True))
 
 
 def plot_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
@@ -14,7 +15,9 @@ def plot_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
     families = diagnosis.families
     with figure(path, 1, 1 + len(families), size=(4.5 * (1 + len(families)), 4.2)) as (drawing, (costs, *errors)):
         lost = [-cost for cost in diagnosis.lost().values()]
-        costs.barh(list(LADDER.values()), lost, color=[COLOURS[agent] for agent in LADDER])
+        costs.barh(
+            [fill(part, 32) for part in diagnosis.ladder.values()], lost, color=[COLOURS[a] for a in diagnosis.ladder]
+        )
         costs.invert_yaxis()
         costs.set(xlabel="return that it costs", title="what each part costs")
         for axes, family in zip(errors, families, strict=True):

@@ -1,5 +1,6 @@
 """Figures of evaluations: trajectories, errors and latents."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,13 +9,17 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 
+from rebody.agents.belief import Reading
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.results import Results
+from rebody.report.plane import draw_circle, draw_map, draw_rim, draw_turn, is_heading, is_place, is_plane, path_of
 from rebody.report.style import BELIEF, IDLE, MOTION, ORACLE, SHADES, TASKS, TRUTH, as_text, figure
 from rebody.tasks import Family
 from rebody.tasks.family_set import fit
-from rebody.types import POSE_FIELDS
+from rebody.tasks.figures import settled
 
+SMALLEST = 1e-3
+"""What is nearer is drawn so [m, m/s, rad]."""
 MARKERS = "os^vD"
 """Of a vector's components, by turns."""
 
@@ -36,8 +41,14 @@ def plot_transfer(results: Results, oracle: Results, idle: Results, path: Path) 
         )
 
 
-def plot_episode(episode: EpisodeResult, path: Path) -> None:
-    """One episode: what was reached and believed of each family that was asked for, the reward, the latent."""
+def plot_episode(episode: EpisodeResult, path: Path, readings: Sequence[Reading] | None = None) -> None:
+    """One episode: what was reached and believed of each family that was asked for, the reward, the latent; of the
+    plane a map, how far robot and belief are from the target, the reward, and how likely each family was.
+
+    `readings` are what was believed after each decision (`rebody.evaluation.listening`), for ellipses and chances.
+    """
+    if path_of(episode) is not None:
+        return _plot_in_plane(episode, path, readings)
     families = episode.asked
     rows = len(families) + 2
     with figure(path, rows, 1, size=(8.0, 2.5 * rows)) as (_, (*reached, rewards, latents)):
@@ -49,9 +60,53 @@ def plot_episode(episode: EpisodeResult, path: Path) -> None:
         latents.set(ylabel="latent mean", xlabel="time [s]")
 
 
+def _plot_in_plane(episode: EpisodeResult, path: Path, readings: Sequence[Reading] | None) -> None:
+    asked = [family for family in episode.asked if not is_place(family)]
+    columns = 2 + len(asked)
+    with figure(path, 2, columns, size=(4.4 * columns, 8.0)) as (drawing, panels):
+        (seen, *of_asked, missed), (rewards, *chances) = panels[:columns], panels[columns:]
+        draw_map(seen, episode, readings)
+        for axes, family in zip(of_asked, asked, strict=True):
+            draw_progress(axes, episode, family)
+        _missed(missed, episode)
+        rewards.plot(episode.time_s, episode.reward, color=MOTION)
+        rewards.set(ylabel="reward: all that is heard", xlabel="time [s]")
+        for axes in chances[1:]:
+            axes.remove()
+        _chances(chances[0], episode, readings)
+        drawing.suptitle(f"{episode.families.named(episode.active_family[-1]).label}: told by the reward alone")
+
+
+def _missed(axes: Axes, episode: EpisodeResult) -> None:
+    """How far robot and belief are from the target, while the family is read rightly."""
+    family, target = episode.last_family, np.array(episode.active_target[-1])
+    read = _while_of(family, episode.inferred_family, episode.inferred_target)
+    read[np.not_equal(episode.active_family, family.name)] = np.nan
+    off = family.quantity.distance(read, target)
+    axes.plot(episode.time_s, np.maximum(off, SMALLEST), ".", color=BELIEF, ms=4, label="belief")
+    axes.plot(episode.time_s, np.maximum(episode.missed(), SMALLEST), color=MOTION, label="robot")
+    axes.axhline(family.tolerance, color="0.7", lw=1.0, ls=":", label="tolerance")
+    axes.set(
+        yscale="log", xlabel="time [s]", ylabel=f"{family.quantity.label}: distance from the target [{family.unit}]"
+    )
+
+
+def _chances(axes: Axes, episode: EpisodeResult, readings: Sequence[Reading] | None) -> None:
+    """Of each family; without readings which one was the likeliest."""
+    named = dict.fromkeys(episode.inferred_family) if readings is None else readings[0].probabilities
+    for name in named:
+        of_family = np.equal(episode.inferred_family, name).astype(float)
+        chances = of_family if readings is None else [reading.probabilities[name] for reading in readings]
+        axes.plot(episode.time_s, chances, color=episode.families.named(name).colour, label=name)
+    label = "likeliest family" if readings is None else "probability of each family"
+    axes.set(xlabel="time [s]", ylabel=label, ylim=(-0.03, 1.03))
+
+
 def draw_progress(axes: Axes, episode: EpisodeResult, family: Family, until: int | None = None) -> None:
     """What a family is about, up to a decision: reached, read from the belief, and true while it was asked."""
     time, reached = np.array(episode.time_s), episode.reached_of(family)
+    if is_plane(family) and not is_place(family):
+        reached = settled(family, reached)  # a gait would scribble all over
     wanted = _while_of(family, episode.active_family, episode.active_target)
     read = _while_of(family, episode.inferred_family, episode.inferred_target)
     spread = np.concatenate([reached, wanted[np.isfinite(wanted[:, 0])]])
@@ -61,6 +116,8 @@ def draw_progress(axes: Axes, episode: EpisodeResult, family: Family, until: int
         axes.plot(*read[:until].T, ".", color=BELIEF, ms=4, label="read from the belief")
         axes.plot(*reached[:until].T, color=MOTION, lw=1.5, label="robot")
         set_plane(axes, family, *ends)
+    elif is_heading(family):
+        draw_circle(axes, time, reached[:, 0], wanted[:, 0], read[:, 0], until)
     else:
         for i, name in enumerate(components(family)):
             shade = SHADES[i % len(SHADES)]
@@ -75,11 +132,6 @@ def draw_progress(axes: Axes, episode: EpisodeResult, family: Family, until: int
         loc="lower left", bbox_to_anchor=(0, 1), ncols=2 + family.size, frameon=False, fontsize=8, borderaxespad=0
     )
     legend.set_in_layout(False)
-
-
-def is_plane(family: Family) -> bool:
-    """Whether its targets are points of a plane."""
-    return family.size == 2 and set(family.quantity.components) <= set(POSE_FIELDS[:3])
 
 
 def set_plane(axes: Axes, family: Family, *ends: tuple[float, float]) -> None:
@@ -119,14 +171,19 @@ def draw_trajectories(axes: Axes, episodes: list[EpisodeResult]) -> None:
     for episode, target in zip(episodes, targets, strict=True):
         colour = plt.get_cmap(TASKS)(0.5 + 0.5 * target[0] / largest)
         if is_plane(family):
-            axes.plot(*episode.reached.T, color=colour, lw=1.2)
+            axes.plot(*settled(family, episode.reached).T, color=colour, lw=1.2)
             axes.plot(*target, "o", color=colour, ms=4)
+            continue
+        if is_heading(family):
+            draw_turn(axes, np.array(episode.time_s), episode.reached[:, 0], target[0], colour)
             continue
         for i, number in enumerate(target):
             axes.plot(episode.time_s, episode.reached[:, i], color=colour, alpha=SHADES[i % len(SHADES)], lw=1.2)
             axes.plot(episode.time_s[-1], number, MARKERS[i % len(MARKERS)], color=colour, ms=4, clip_on=False)
     if is_plane(family):
         set_plane(axes, family)
+    elif is_heading(family):
+        draw_rim(axes, episodes[0].time_s[-1])
     else:
         axes.set(xlabel="time [s]", ylabel=f"{family.name} [{family.unit}]")
     axes.set(title=f"{family.name}: robot (lines), targets (dots)")

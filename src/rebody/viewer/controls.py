@@ -15,7 +15,8 @@ from rebody.evaluation.trial import Trial
 from rebody.inputs import number
 from rebody.names import AGENTS
 from rebody.ranges import Box
-from rebody.tasks import SHIPPED
+from rebody.tasks import SHIPPED, FamilySet
+from rebody.tasks.family_set import draw
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.session import target_range
@@ -56,6 +57,8 @@ class Push:
     """A change of velocity [m/s]."""
 
     change: float
+    axis: int = 0
+    """Along x, or 1 for y."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +92,12 @@ class Controls:
             self._give = gui.add_button("Change the task now", icon=viser.Icon.TARGET)
             self._draw = gui.add_button("Any other task", icon=viser.Icon.DICE, color="gray")
         with gui.add_folder("The robot"):
-            self._pushes = gui.add_button_group(
-                "Push [m/s]", tuple(PUSHES), hint="Changes the velocity of all its parts"
-            )
+            self._pushes = [
+                gui.add_button_group(
+                    f"{name} [m/s]", tuple(PUSHES), hint=f"Changes the velocity of all its parts{along}"
+                )
+                for name, along in (("Push", " along x"), ("Push y", " along y"))
+            ]
             self._speed = gui.add_slider("Speed [x]", *SPEEDS, 0.1, REAL_TIME, hint="Simulated seconds per second")
             self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
             self._restart = gui.add_button("Restart", icon=viser.Icon.REFRESH, color="gray")
@@ -120,6 +126,7 @@ class Controls:
     def show_task(self, trial: Trial, task: TaskSpec) -> None:
         """The hidden task, and which others there are."""
         self._known = trial.inference.contract.families
+        self._pushes[1].visible = "y" in trial.inference.contract.fields
         self._ranges = {name: _in_tenths(target_range(trial, name)) for name in self._known.names}
         self._family.hint = "; ".join(f"{family.name}: {family.label}" for family in self._known)
         self._family.options = tuple(self._ranges)
@@ -139,7 +146,8 @@ class Controls:
     def _connect(self) -> None:
         self._give.on_click(self._ordering(lambda _: self._chosen_task()))
         self._draw.on_click(self._ordering(lambda _: self._any_task()))
-        self._pushes.on_click(self._ordering(lambda event: _push(event.target.value)))
+        for axis, buttons in enumerate(self._pushes):
+            buttons.on_click(self._ordering(lambda event, axis=axis: _push(event.target.value, axis)))
         self._restart.on_click(self._ordering(lambda _: Restart()))
         self._pause.on_click(lambda _: self.pause(not self.paused))
         self._family.on_update(self._ordering(lambda _: self._show_range(self._family.value)))
@@ -196,8 +204,10 @@ class Controls:
         family = random.choice(list(self._ranges))
         box = self._ranges[family]
         ends, far = list(zip(box.low, box.high, strict=True)), FARTHEST_DRAWN * np.array(box.largest)
+        alone, rng = FamilySet((self._known.named(family),)), np.random.default_rng()
         for _ in range(TRIES):
-            target = [_within(round(random.uniform(*each), 1), each) for each in ends]
+            drawn = draw(alone, rng).target.tolist()
+            target = [_within(round(number, 1), each) for number, each in zip(drawn, ends, strict=True)]
             if np.any(np.abs(target) >= far):
                 return TaskSpec(family, tuple(target))
         return TaskSpec(family, box.high)
@@ -210,9 +220,9 @@ def _in_tenths(box: Box) -> Box:
     return Box(low, high) if all(map(operator.lt, low, high)) else box
 
 
-def _push(button: str) -> Push:
+def _push(button: str, axis: int) -> Push:
     _check_among(PUSHES, button, "push")
-    return Push(PUSHES[button])
+    return Push(PUSHES[button], axis)
 
 
 def _check_among(offered: Collection[str], name: str, what: str) -> None:

@@ -14,11 +14,10 @@ from matplotlib.text import Text
 
 from rebody.agents.belief import Reading
 from rebody.inference.mixture.padded import MixturePrior
+from rebody.report.ellipse import STDS, outline
 from rebody.tasks import FamilySet
 from rebody.viewer import colours
 
-STDS = 2.0
-"""How many standard deviations an ellipse reaches."""
 SHOWN = 50
 """Decisions that the belief's trail goes back."""
 LATENT, PROJECTED = ("latent 1", "latent 2"), ("main direction 1", "main direction 2")
@@ -144,11 +143,10 @@ class LatentPicture:
 
 def _outline(mean: Float[np.ndarray, " 2"], covariance: Float[np.ndarray, "2 2"]) -> dict[str, Any]:
     """An ellipse's centre, width, height and angle [degrees]."""
-    values, vectors = np.linalg.eigh(covariance)
-    width, height = 2 * STDS * np.sqrt(np.maximum(values, 0.0))
+    first, second, angle = outline(covariance)
     return {
         "center": tuple(mean),
-        "width": width,
-        "height": height,
-        "angle": np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0])),
+        "width": 2 * first,
+        "height": 2 * second,
+        "angle": np.degrees(angle),
     }

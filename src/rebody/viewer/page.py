@@ -5,11 +5,13 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
 
 import viser
 
 from rebody.errors import RebodyError
-from rebody.evaluation.trial import Trial
+from rebody.evaluation.trial import Trial, check_trial
 from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.controls import Choice, Controls, Offered, Order, Push, Restart
@@ -47,7 +49,7 @@ class Page:
         self.controls = Controls(server.gui, offered, choice)
         self.controls.show_task(trial, task)
         self._panel = BeliefPanel(server.gui, trial)
-        self._server, self._load = server, load
+        self._server, self._load, self._offered = server, load, offered
         self._ended = threading.Event()
         self._first = (choice, trial, task)
 
@@ -69,7 +71,7 @@ class Page:
 
     def _watch(self, choice: Choice, session: Session) -> None:
         """Show that session, in place of the one before."""
-        self._scene = Scene(self._server, session.body.model, session.trial.in_play)
+        self._scene = Scene(self._server, session.body, session.trial.in_play, session.is_in_plane)
         self._panel.listen_to(session.trial)
         self.controls.show_task(session.trial, session.task)
         self._choice, self.session = choice, session
@@ -99,8 +101,8 @@ class Page:
             case TaskSpec():
                 self.session.set_task(order)
                 self.controls.show_task(self.session.trial, order)
-            case Push(change):
-                self.session.push(change)
+            case Push(change, axis):
+                self.session.push(change, axis)
             case Restart():
                 self.session.restart()
                 self._begin()
@@ -109,13 +111,40 @@ class Page:
 
     def _change_to(self, choice: Choice) -> None:
         self.controls.show_status(words.loading(choice.robot))
-        trial = self._load(choice)
+        choice, trial = self._fitting(choice)
         session = Session(trial, fitting(trial, self.session.task))
+        self.controls.show_choice(choice)
         try:
             self._watch(choice, session)
         except Exception:  # it cannot be drawn
             self._watch(self._choice, self.session)
             raise
+
+    def _fitting(self, choice: Choice) -> tuple[Choice, Trial]:
+        """The choice and its parts; where the new one of robot and module does not go with the other, that changes too.
+
+        RebodyError where nothing that is offered goes with it.
+        """
+        try:
+            return choice, self._checked(choice)
+        except RebodyError:
+            for other in self._alternatives(choice):
+                with suppress(RebodyError):
+                    return other, self._checked(other)
+            raise
+
+    def _alternatives(self, choice: Choice) -> list[Choice]:
+        new_robot, new_module = choice.robot != self._choice.robot, choice.inference != self._choice.inference
+        if new_robot == new_module:
+            return []
+        if new_robot:
+            return [replace(choice, inference=name) for name in self._offered.inferences]
+        return [replace(choice, robot=name) for name in self._offered.robots]
+
+    def _checked(self, choice: Choice) -> Trial:
+        trial = self._load(choice)
+        check_trial(trial, [fitting(trial, self.session.task)])
+        return trial
 
     def _go_on(self) -> None:
         """Simulate and show; the page outlives whatever goes wrong in a session."""
@@ -149,14 +178,14 @@ class Page:
     def _show(self, now: float) -> None:
         """Bring the page up to date with the session."""
         session = self.session
-        pose, x = session.between(self._pace.share)
+        pose, where = session.between(self._pace.share)
         moment = session.moments[-1] if session.moments else None
-        self._scene.show_body(pose, x)
-        self._scene.show_marks(session.task, moment, x)
+        self._scene.show_body(pose, where)
+        self._scene.show_marks(session.task, moment, where)
         self.controls.show_status(words.status(session, self._pace.reached, self.controls.paused))
         if (moment, session.task) != self._seen:
             self._seen = (moment, session.task)
-            self._panel.show(session.task, [*session.moments])
+            self._panel.show(session)
         if moment is not self._drawn and now >= self._latent_due:
             self._drawn, self._latent_due = moment, now + LATENT_S
             self._panel.show_latent([*session.moments])

@@ -5,18 +5,18 @@ from collections.abc import Sequence
 import viser
 
 from rebody.evaluation.trial import Trial
-from rebody.tasks.task_file import TaskSpec
 from rebody.viewer import words
 from rebody.viewer.latent import LatentPicture
+from rebody.viewer.map import draw_map
 from rebody.viewer.plots import ProbabilityPlot, ReachedPlot
-from rebody.viewer.session import Moment
+from rebody.viewer.session import Moment, Session
 
 PANEL_PX = 340
 """Its width."""
 
 
 class BeliefPanel:
-    """Numbers, two plots over time, and the latent; a second tab explains it all."""
+    """Numbers, a map where there is a plane, two plots over time, and the latent; a second tab explains it all."""
 
     def __init__(self, gui: viser.GuiApi, trial: Trial):
         panel = gui.add_panel()
@@ -24,6 +24,7 @@ class BeliefPanel:
         self._tab = panel.add_tab("What it believes")
         with self._tab:
             self._numbers = gui.add_html("")
+            self._map = gui.add_html("")
         self._listen_to(trial)
         with panel.add_tab("What you see"):
             self._guide = gui.add_markdown(words.guide(trial.inference.contract.families))
@@ -38,8 +39,10 @@ class BeliefPanel:
             self._listen_to(trial)
             self._guide.content = words.guide(trial.inference.contract.families)
 
-    def show(self, task: TaskSpec, moments: Sequence[Moment]) -> None:
+    def show(self, session: Session) -> None:
         """All but the latent."""
+        task, moments = session.task, [*session.moments]
+        self._map.content = draw_map(session) if session.is_in_plane else ""
         self._numbers.content = words.numbers(self._known, task, moments[-1] if moments else None)
         self._reached.show(moments, self._known.named(task.family))
         self._probabilities.show(moments)

@@ -17,10 +17,14 @@ from rebody.evaluation.trial import Trial, check_trial
 from rebody.inputs import number
 from rebody.ranges import Box
 from rebody.tasks.task_file import TaskSpec, active_tasks
-from rebody.types import DECISION_DT, AnyArray, GlobalState
+from rebody.types import DECISION_DT, POSE_FIELDS, AnyArray, GlobalState
 
 REMEMBERED_S = 20.0
 """How far back moments are kept [s]."""
+PATH_S = 600.0
+"""How far back the path is kept, for a map [s]."""
+FIRST_SHARE = 0.3
+"""Of the largest target, where nobody says another one: it is soon reached."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,8 @@ class Session:
         """Compiles everything, which takes seconds; RebodyError where the parts and the task do not fit together."""
         self.trial = trial
         self.moments: deque[Moment] = deque(maxlen=round(REMEMBERED_S / DECISION_DT))
+        self.path: deque[tuple[float, float]] = deque(maxlen=round(PATH_S / DECISION_DT))
+        """Where the body was after each decision [m]."""
         self.set_task(task)
         self.body: Simulation
         if trial.robot is None:
@@ -60,12 +66,14 @@ class Session:
         self.restart()
 
     def restart(self, seed: int = 0) -> None:
-        """Back to x = 0; the agent forgets everything, the task stays."""
+        """Back to the start; the agent forgets everything, the task stays."""
         self.body.reset(np.random.default_rng(seed))
         self._now = self._before = self._seen()
         self._drive = Drive(self._agent, self._controller, self.body, self.trial.in_play)
         self._listener = self.trial.inference.begin(_fields(self.body.observe(), self.trial), self.trial.sharpens)
         self.moments.clear()
+        self.path.clear()
+        self.path.append(self.pose[:2])
 
     def step(self) -> None:
         """One step of the body, which takes `body.step_s`; every 0.1 s a decision follows."""
@@ -77,13 +85,23 @@ class Session:
 
     @property
     def x(self) -> float:
-        """Where the body is [m]."""
-        return self._now[1]
+        """Where the body is along x [m]."""
+        return self.pose[0]
 
-    def between(self, share: float) -> tuple[Float[np.ndarray, " nq"], float]:
-        """Joint positions for a picture and x [m], that share of the way from the step before to the last one."""
-        (before, x_before), (now, x) = self._before, self._now
-        return before + share * (now - before), x_before + share * (x - x_before)
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """Where the body is along x and y [m], and its heading [rad]."""
+        return self._pose
+
+    @property
+    def is_in_plane(self) -> bool:
+        """Whether body and module know of places beside the line."""
+        return "y" in self.trial.inference.contract.fields
+
+    def between(self, share: float) -> tuple[Float[np.ndarray, " nq"], Float[np.ndarray, " 2"]]:
+        """Joint positions for a picture, and x and y [m], that share of the way from the step before to the last."""
+        (before, there), (now, here) = self._before, self._now
+        return before + share * (now - before), there + share * (here - there)
 
     @property
     def time_s(self) -> float:
@@ -101,17 +119,23 @@ class Session:
         self._agent = trial_agent(self.trial, tasks)
         self.task, self._tasks = task, tasks
 
-    def push(self, change: float) -> None:
-        """Change the velocity of the body's centre of mass along x [m/s]; RebodyError if that is no number."""
-        self.body.push(np.array([number(change, "the push")]))
+    def push(self, change: float, axis: int = 0) -> None:
+        """Change the velocity of the body's centre of mass along x, or y (axis 1) where it can move so [m/s];
+        RebodyError if that is no number.
+        """
+        along = number(change, "the push") * np.eye(2)[[axis]]
+        self.body.push(along if self.is_in_plane else along[:, 0])
 
-    def _seen(self) -> tuple[Float[np.ndarray, " nq"], float]:
-        """Joint positions for a picture, and x [m]."""
-        return self.body.picture_pose()[0], float(self.body.pose()[0, 0])
+    def _seen(self) -> tuple[Float[np.ndarray, " nq"], Float[np.ndarray, " 2"]]:
+        """Joint positions for a picture, and x and y [m]."""
+        x, y, yaw = self.body.pose()[0, [0, 1, POSE_FIELDS.index("yaw")]].tolist()
+        self._pose = (x, y, yaw)
+        return self.body.picture_pose()[0], np.array([x, y])
 
     def _remember(self, heard: Observation) -> None:
         reading = self._listener.update(_fields(heard.state, self.trial), heard.reward[0])
         said = float(heard.reward[0]), reading, self._listener.doubts()
+        self.path.append(self.pose[:2])
         reached = {family.name: _numbers(family.quantity.read(heard.state)) for family in self.trial.in_play}
         self.moments.append(Moment(self.time_s, self.task, reached, *said, self._subgoal()))
 
@@ -134,7 +158,7 @@ def fitting(trial: Trial, task: TaskSpec) -> TaskSpec:
     known = trial.inference.contract.families
     family = task.family if task.family in known else known.names[0]
     box = target_range(trial, family)
-    target = task.target if len(task.target) == box.size and family == task.family else np.array(box.high) / 2
+    target = task.target if len(task.target) == box.size and family == task.family else FIRST_SHARE * np.array(box.high)
     return TaskSpec(family, tuple(np.clip(target, box.low, box.high).tolist()))
 
 

@@ -26,12 +26,16 @@ speeds [m/s], or point to a place that is farther away than the picture shows.
 
 **Black, dashed: the hidden task.** {kinds}.
 
-**Red: the belief**, as a linear probe reads it from the module's latent, and how sure it is of the kind. It begins with
-a guess.
+**Red: the belief**, as it is read from the module's latent, and how sure it is of the kind. It begins with a guess.
 
-**Orange: the subgoal** that the agent asks of the robot's tracker, a policy that moves the joints.
+**Orange: the subgoal** that the agent asks of the robot's tracker, a policy that moves the joints, or of the navigator,
+which moves a robot's joystick.
 
 **Blue: the robot**, what it reaches.
+
+**Map**, where there is a plane, from above: the robot's path and heading; a cross for the hidden place, a dot for the
+believed one, a ring for the subgoal. Velocities and headings are arrows from the robot. The ellipse is what the rewards
+leave open, two standard deviations of it; it is a first-order estimate, and long where the robot has hardly looked.
 
 **Probability.** Which base task the module believes in: a kind, and the direction of its target (dashes).
 

@@ -133,7 +133,9 @@ def drive(
     moves = jnp.abs(share) * jnp.where(share > 0, walker.measured.high, walker.measured.low)
     begun = toy.begin(still, still, still, moves), jnp.zeros((size, len(WAYS)))
     (ended, _), course = jax.lax.scan(step, begun, None, length=config.decisions)
-    return told, course, jnp.where(told.slot == PLACES, time_to_go(walker, command(ended).value), 0.0)
+    is_place = told.slot == PLACES
+    place = jnp.where(is_place[:, None], command(ended).value, 1.0)  # the bearing of nothing has no slope
+    return told, course, jnp.where(is_place, time_to_go(walker, place), 0.0)
 
 
 def subgoals(config: NavigatorConfig, size: int, key: PRNGKeyArray) -> Subgoal:
