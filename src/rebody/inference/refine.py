@@ -3,14 +3,16 @@
 The expert is a likelihood with a handful of parameters, its amounts; all here is about one expert and one body.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Bool, Float
+from jaxtyping import Array, Bool, Float
 
 from rebody.inference.decoder import Expert
+from rebody.inference.roots import root_of, solved
 from rebody.types import AnyArray
 
 STEPS = 6
@@ -37,8 +39,8 @@ class Known(NamedTuple):
     """What is known of the amounts beside that: a Gaussian around `centre`, and a weak one around `guess`."""
 
     centre: Float[AnyArray, " amount"]
-    information: Float[AnyArray, "amount amount"]
-    """Inverse covariance."""
+    root: Float[AnyArray, "amount amount"]
+    """Root of the inverse covariance (`root_of`)."""
     guess: Float[AnyArray, " amount"]
     precision: Float[AnyArray, " amount"]
     """One over the standard deviation."""
@@ -50,8 +52,8 @@ class Refined(NamedTuple):
     amount: Float[AnyArray, "*batch amount"]
     cost: Float[AnyArray, "*batch"]
     """Negative log-likelihood there, but for a constant [nats]."""
-    information: Float[AnyArray, "*batch amount amount"]
-    """Inverse covariance there."""
+    root: Float[AnyArray, "*batch amount amount"]
+    """Root of the inverse covariance there (`root_of`)."""
 
 
 def surprise(
@@ -66,14 +68,24 @@ def surprise(
 
 def refine(heard: Heard, start: Float[AnyArray, " amount"], known: Known) -> Refined:
     """Levenberg-Marquardt from a start, a fixed number of steps; it never ends anywhere worse."""
-    size = start.shape[-1]
-    # float32 loses the small directions of a matrix that has gathered much in another one
-    ridge = (1e-4 * jnp.trace(known.information) + 1e-4) * jnp.eye(size)
-    root = jnp.linalg.cholesky(known.information + ridge).T
 
     def unexplained(amount):
         window = jnp.where(heard.is_heard, surprise(heard.expert, heard.states, heard.rewards, amount[None]), 0.0)
-        return jnp.concatenate([window, root @ (amount - known.centre), known.precision * (amount - known.guess)])
+        return jnp.concatenate([window, known.root @ (amount - known.centre), known.precision * (amount - known.guess)])
+
+    amount, cost, slope = levenberg_marquardt(unexplained, start, STEPS)
+    return Refined(amount, cost, root_of(slope))
+
+
+def levenberg_marquardt(
+    unexplained: Callable[[Float[Array, " amount"]], Float[Array, " error"]],
+    start: Float[AnyArray, " amount"],
+    steps: int,
+    within: Callable[[Float[Array, " amount"]], Float[Array, " amount"]] = lambda amount: amount,
+) -> tuple[Float[Array, " amount"], Float[Array, ""], Float[Array, "error amount"]]:
+    """Where so many steps down half of the squared errors end, never anywhere worse; what is left of it there, and the
+    errors' slope. `within` brings amounts back into their range.
+    """
 
     def cost_of(amount):
         return 0.5 * jnp.sum(unexplained(amount) ** 2)
@@ -81,15 +93,13 @@ def refine(heard: Heard, start: Float[AnyArray, " amount"], known: Known) -> Ref
     def step(walk, _):
         amount, cost, damping = walk
         error, slope = unexplained(amount), jax.jacfwd(unexplained)(amount)
-        information = slope.T @ slope
-        damped = information + damping * jnp.diag(jnp.diag(information)) + RIDGE * jnp.eye(size)
-        new = amount - jnp.linalg.solve(damped, slope.T @ error)
+        damped = jnp.diag(jnp.sqrt(damping * jnp.sum(slope**2, axis=0) + RIDGE))
+        new = within(amount - solved(root_of(slope, damped), slope.T @ error))
         new_cost = cost_of(new)
         helped = new_cost < cost
         ended = jnp.where(helped, new, amount), jnp.where(helped, new_cost, cost)
         return (*ended, damping * jnp.where(helped, LESS, MORE)), None
 
     begun = (start, cost_of(start), jnp.asarray(FIRST_DAMPING))
-    (amount, cost, _), _ = jax.lax.scan(step, begun, length=STEPS)
-    slope = jax.jacfwd(unexplained)(amount)
-    return Refined(amount, cost, slope.T @ slope)
+    (amount, cost, _), _ = jax.lax.scan(step, begun, length=steps)
+    return amount, cost, jax.jacfwd(unexplained)(amount)
