@@ -62,7 +62,7 @@ class Memory(eqx.Module):
     """What is carried from decision to decision."""
 
     heard: Heard
-    shares: tuple[Float[AnyArray, "*batch particle number"], ...]
+    shares: tuple[Float[AnyArray, "*batch particle _"], ...]
     """Where the particles of each base task are within its range, the likeliest first."""
     said: Int[AnyArray, "*batch"]
     """The likeliest base task."""
@@ -154,8 +154,9 @@ def _moved(heard: Heard, family: Family, box: Box, start: Float[Array, " number"
     alone = FamilySet((family,))
 
     def unexplained(share):
-        task = Task(jnp.zeros((), jnp.int32), target_at(box, share))
-        apart = (heard.rewards - alone.reward(Task(task.family[None], task.target[None]), heard.states)) / REWARD_STD
+        target = jnp.broadcast_to(target_at(box, share), (HEARD, box.size))
+        task = Task(jnp.zeros(HEARD, jnp.int32), target)
+        apart = (heard.rewards - alone.reward(task, heard.states)) / REWARD_STD
         return jnp.sqrt(heard.stands_for) * apart
 
     share, cost, slope = levenberg_marquardt(unexplained, start, STEPS, lambda share: _within(family, box, share))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from rebody.inference.decoder import Expert
 from rebody.inference.roots import root_of, solved
@@ -20,6 +20,9 @@ STEPS = 6
 FLOOR, RELATIVE = 2e-3, 0.01
 """Standard deviation of the decoder's error: so much of the reward scale, and such a share of the reward, since what
 is not learned exactly is the weight of a distance."""
+ASSUMED = 1e-3
+"""How many rewards that error counts as, when it is estimated by what is left: a decoder may be far better, and rewards
+may be noisy."""
 RIDGE = 1e-6
 FIRST_DAMPING, LESS, MORE = 1e-2, 0.2, 8.0
 """Of Levenberg and Marquardt: at the start, after a step that helped, and after one that did not."""
@@ -36,11 +39,12 @@ class Heard(eqx.Module):
 
 
 class Known(NamedTuple):
-    """What is known of the amounts beside that: a Gaussian around `centre`, and a weak one around `guess`."""
+    """What is known of the amounts beside that: half of the square of `root @ amount - aim`, and a weak Gaussian around
+    `guess`."""
 
-    centre: Float[AnyArray, " amount"]
     root: Float[AnyArray, "amount amount"]
-    """Root of the inverse covariance (`root_of`)."""
+    """Root of an inverse covariance (`root_of`)."""
+    aim: Float[AnyArray, " amount"]
     guess: Float[AnyArray, " amount"]
     precision: Float[AnyArray, " amount"]
     """One over the standard deviation."""
@@ -54,6 +58,8 @@ class Refined(NamedTuple):
     """Negative log-likelihood there, but for a constant [nats]."""
     root: Float[AnyArray, "*batch amount amount"]
     """Root of the inverse covariance there (`root_of`)."""
+    honest: Float[AnyArray, "*batch amount amount"]
+    """The same by the errors that are left, not by those that are assumed; beside a unit Gaussian (thesis 5.6)."""
 
 
 def surprise(
@@ -69,12 +75,22 @@ def surprise(
 def refine(heard: Heard, start: Float[AnyArray, " amount"], known: Known) -> Refined:
     """Levenberg-Marquardt from a start, a fixed number of steps; it never ends anywhere worse."""
 
+    size = start.shape[-1]
+
     def unexplained(amount):
         window = jnp.where(heard.is_heard, surprise(heard.expert, heard.states, heard.rewards, amount[None]), 0.0)
-        return jnp.concatenate([window, known.root @ (amount - known.centre), known.precision * (amount - known.guess)])
+        return jnp.concatenate([window, known.root @ amount - known.aim, known.precision * (amount - known.guess)])
 
     amount, cost, slope = levenberg_marquardt(unexplained, start, STEPS)
-    return Refined(amount, cost, root_of(slope))
+    window = len(heard.rewards)
+    rows = jnp.arange(len(slope)) < window + size
+    noise = jnp.where(rows, _noise(unexplained(amount)[:window], jnp.sum(heard.is_heard) - size), 1.0)
+    return Refined(amount, cost, root_of(slope), root_of(slope / noise[:, None], jnp.eye(size)))
+
+
+def _noise(left: Float[Array, " window"], freedom: Int[Array, ""]) -> Float[Array, ""]:
+    """Standard deviation of the errors, in units of the assumed one, which counts as `ASSUMED` of a reward."""
+    return jnp.sqrt((ASSUMED + jnp.sum(left**2)) / (ASSUMED + jnp.maximum(freedom, 0)))
 
 
 def levenberg_marquardt(
@@ -100,6 +116,7 @@ def levenberg_marquardt(
         ended = jnp.where(helped, new, amount), jnp.where(helped, new_cost, cost)
         return (*ended, damping * jnp.where(helped, LESS, MORE)), None
 
+    start = jnp.asarray(start)
     begun = (start, cost_of(start), jnp.asarray(FIRST_DAMPING))
     (amount, cost, _), _ = jax.lax.scan(step, begun, length=steps)
     return amount, cost, jax.jacfwd(unexplained)(amount)

@@ -28,17 +28,25 @@ def root_of(*slopes: Float[AnyArray, "_ amount"]) -> Float[Array, "amount amount
 
 def solved(root: Float[AnyArray, "amount amount"], vector: Float[AnyArray, " amount"]) -> Float[Array, " amount"]:
     """x of R^T R x = vector; the root must have no 0 on its diagonal."""
-    size, half, x = root.shape[-1], [], []
-    for i in range(size):
-        half.append((vector[i] - sum(root[k, i] * half[k] for k in range(i))) / root[i, i])
-    for i in reversed(range(size)):
+    half, x = _half_solved(root, vector), []
+    for i in reversed(range(root.shape[-1])):
         x.insert(0, (half[i] - sum(root[i, i + 1 + k] * later for k, later in enumerate(x))) / root[i, i])
     return jnp.stack(x)
 
 
-def covariance(root: Float[AnyArray, "amount amount"]) -> Float[Array, "amount amount"]:
-    """Inverse of the information."""
-    return jnp.stack([solved(root, column) for column in jnp.eye(root.shape[-1])])
+def variance_along(
+    root: Float[AnyArray, "amount amount"], slopes: Float[AnyArray, "number amount"]
+) -> Float[Array, " number"]:
+    """Variances of numbers that change with the amounts by these slopes; never negative, whatever is rounded."""
+    return jnp.stack([jnp.sum(jnp.stack(_half_solved(root, slope)) ** 2) for slope in slopes])
+
+
+def _half_solved(root: Float[AnyArray, "amount amount"], vector: Float[AnyArray, " amount"]) -> list[Array]:
+    """y of R^T y = vector."""
+    half: list[Array] = []
+    for i in range(root.shape[-1]):
+        half.append((vector[i] - sum(root[k, i] * half[k] for k in range(i))) / root[i, i])
+    return half
 
 
 def log_determinant(root: Float[AnyArray, "amount amount"]) -> Float[Array, ""]:

@@ -151,10 +151,11 @@ class Sharpened(eqx.Module):
             evidence = jnp.maximum(log_share, UNLIKELIEST) + explained
             logits = jnp.asarray(choice(kind))
             kind = kind + (self._wanted(logits, log_share, evidence) - logits) @ jnp.linalg.pinv(choice.weights[0])
+        spreads = [each.spread(expert) for expert, each in zip(self.decoder.experts, hypotheses, strict=True)]
         mean = jnp.concatenate([kind, *(each.amounts[0] for each in hypotheses)])
         return Belief(
             mean,
-            jnp.concatenate([guess.variance[: self.decoder.kinds], *(each.variance[0] for each in hypotheses)]),
+            jnp.concatenate([guess.variance[: self.decoder.kinds], *spreads]),
         )
 
     def _wanted(

@@ -1,7 +1,5 @@
 """How honest beliefs are: how often the truth lies inside of the regions that they say it does."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import scipy.stats
 from jaxtyping import Float
@@ -16,17 +14,17 @@ AFTER = (10, 20, 50, 110)
 """Decisions."""
 
 
-def coverage(
-    reader: PlaceReader, families: FamilySet, tasks: Task, belief: Belief, after: Sequence[int] = AFTER
-) -> dict[str, float]:
+def coverage(reader: PlaceReader, families: FamilySet, tasks: Task, belief: Belief) -> dict[str, float]:
     """Shares of the episodes whose true target lies in the region of each probability of its own family's Gaussian.
 
     Tasks and beliefs are [decision, episode].
     """
     figures = {}
-    for i, (family, squared) in enumerate(zip(families, squared_deviations(reader, families, tasks, belief), strict=True)):
+    for i, (family, squared) in enumerate(
+        zip(families, squared_deviations(reader, families, tasks, belief), strict=True)
+    ):
         of_family = np.asarray(tasks.family[-1]) == i
-        for decision in (each for each in after if each <= len(squared)):
+        for decision in (each for each in AFTER if each <= len(squared)):
             off = squared[decision - 1, of_family]
             for region in REGIONS:
                 inside = off <= scipy.stats.chi2.ppf(region, family.size)
