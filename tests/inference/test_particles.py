@@ -76,4 +76,4 @@ def test_bodies_do_not_hear_each_other():
 
 def test_a_ring_is_told_by_length_and_bearing():
     ring = Box((2.0, -np.pi), (4.0, np.pi), polar=True)
-    np.testing.assert_allclose(target_at(ring, np.float32([0.5, 0.75])), (0.0, 3.0), atol=1e-5)
+    np.testing.assert_allclose(target_at(ring, np.array([0.5, 0.75], np.float32)), (0.0, 3.0), atol=1e-5)
