@@ -511,7 +511,7 @@ def test_the_error_of_a_state_knows_no_turns():
 
     window = Transition(random_states((4, 6)), rng.uniform(-3, 0, (4, 6)).astype("f4"), random_states((4, 6)))
     heard = Evidence(
-        window, np.zeros((4, 6), np.int32), np.ones((4, 6, 3), bool), random_states((4, 3)),
+        window, np.zeros((4, 6), np.int32), np.zeros((4, 6, 3), "f4"), random_states((4, 3)),
         np.zeros((4, 3, 1), "f4"), rng.uniform(-3, 0, (4, 3)).astype("f4"), random_states((4, 3)),
     )  # fmt: skip
     turned = eqx.tree_at(

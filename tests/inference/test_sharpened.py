@@ -116,7 +116,7 @@ def test_a_refinement_never_ends_anywhere_worse(module):
         states = decoder.read(expert, scaled(state, encoder.fields, encoder.scales))
         rewards = jnp.asarray(-rng.uniform(0, 1, 32), jnp.float32)
         what = Heard(expert, states, rewards, jnp.arange(32) > 4)
-        known = Known(jnp.zeros(2), jnp.zeros((2, 2)), jnp.zeros(2), jnp.full(2, 0.01))
+        known = Known(jnp.zeros((2, 2)), jnp.zeros(2), jnp.zeros(2), jnp.full(2, 0.01))
         for start in jnp.asarray(rng.normal(size=(5, 2)), jnp.float32):
             ended = eqx.filter_jit(refine)(what, start, known)
             apart = rewards - expert(states, jnp.tile(start, (32, 1)))

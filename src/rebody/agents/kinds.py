@@ -21,6 +21,7 @@ from rebody.agents.parts import Inference, ScratchParts
 from rebody.agents.slots import OneSlot, SlotChooser
 from rebody.control.slot_policy import SlotPolicy
 from rebody.inference.exact import exact_posterior, read_mode
+from rebody.inference.particles import ParticlePosterior
 from rebody.tasks import FamilySet
 from rebody.types import Task
 
@@ -104,7 +105,8 @@ def _readout(of: Ingredients) -> Agent:
 
 
 def _bayes(of: Ingredients) -> Agent:
-    posterior = exact_posterior(of.inference.contract.families)
+    families = of.inference.contract.families
+    posterior = exact_posterior(families) if families.size == 1 else ParticlePosterior(families)
     return ReadoutAgent(inferrer=posterior, reader=read_mode, **of.speaking, **of.told)
 
 

@@ -34,9 +34,17 @@ class Episodes(eqx.Module):
 
 @eqx.filter_jit
 def rollout_on_toy(
-    agent: Agent, toy: Toy, tasks: Task, families: FamilySet, disturbance: Disturbance | None = None
+    agent: Agent,
+    toy: Toy,
+    tasks: Task,
+    families: FamilySet,
+    disturbance: Disturbance | None = None,
+    reward_noise: float = 0.0,
 ) -> Episodes:
-    """Episodes on a toy at home and at rest; `tasks` are the active ones, [time, episode], of `families`."""
+    """Episodes on a toy at home and at rest; `tasks` are the active ones, [time, episode], of `families`.
+
+    `reward_noise` is the standard deviation of what the agent hears around what is earned, in the reward's unit.
+    """
     still = jnp.zeros(tasks.family.shape[1])
     body = toy.begin(global_state(x=still), disturbance)
     carry, command = agent.begin(toy.observe(body))
@@ -47,7 +55,8 @@ def rollout_on_toy(
         body = toy.step(body, command.action, key)
         state = toy.observe(body)
         earned = families.reward(task, state)
-        carry, following = agent.decide(carry, Observation(state, earned))
+        noise = reward_noise * jax.random.normal(jax.random.fold_in(key, 1), earned.shape)
+        carry, following = agent.decide(carry, Observation(state, earned + noise))
         return (body, carry, following), (state, earned, carry.belief, command.subgoal)
 
     keys = jax.random.split(jax.random.key(0), len(tasks.family))

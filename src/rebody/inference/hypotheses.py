@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from rebody.inference.decoder import Expert
-from rebody.inference.inputs import CIRCULAR, seen
-from rebody.inference.refine import RIDGE, Heard, Known, Refined, refine, surprise
+from rebody.inference.inputs import CIRCULAR, apart, seen
+from rebody.inference.refine import Heard, Known, Refined, refine, surprise
+from rebody.inference.roots import log_determinant, root_of, variance_along
 from rebody.types import AnyArray, Belief
 
 KEPT = 2
@@ -17,10 +18,12 @@ APART = 3.0
 """Standard deviations between two hypotheses that are not one and the same."""
 HOPELESS = 20.0
 """A hypothesis that is so much less likely than the best does not count [nats]."""
-STARTS = 8
-"""All over the places that an expert may mean, one tried at each decision."""
+STARTS, TRIED = 8, 1
+"""All over the places that an expert may mean, and how many of them are tried at each decision."""
 GUESS_DEVIATIONS = 100.0
 """The guess is a prior of so many of its standard deviations: early in an episode the encoder is far too sure."""
+LEAST, TINY, SCALED = 1e-14, 1e-20, 8
+"""Least variance of an amount, and how often they are scaled."""
 FADING = 0.998
 """Of what left the window, at each decision."""
 
@@ -29,31 +32,57 @@ class Hypotheses(eqx.Module):
     """Amounts that explain what was heard, the most likely first."""
 
     amounts: Float[AnyArray, "*batch kept amount"]
-    information: Float[AnyArray, "*batch kept amount amount"]
-    """Inverse covariance by what left the window, around the amounts."""
+    root: Float[AnyArray, "*batch kept amount amount"]
+    """Root of the information by what left the window (`root_of`)."""
+    aim: Float[AnyArray, "*batch kept amount"]
+    """The root times the amounts that this information speaks of."""
     past: Float[AnyArray, "*batch kept"]
-    """Negative log-likelihood of what left the window [nats]; infinite where there is no hypothesis."""
-    variance: Float[AnyArray, "*batch kept amount"]
+    """Least negative log-likelihood of what left the window [nats]; infinite where there is no hypothesis."""
+    honest: Float[AnyArray, "*batch kept amount amount"]
+    """Root of the information by all that was heard, by the errors that are left (`Refined.honest`)."""
     cost: Float[AnyArray, "*batch kept"]
     """Negative log-likelihood of all that was heard [nats]."""
+    volume: Float[AnyArray, "*batch kept"]
+    """Logarithm of how large the region around the amounts is that explains it as well [nats]."""
 
     def remembering(
         self, expert: Expert, state: Float[AnyArray, " own"], reward: Float[AnyArray, ""], leaves: Bool[AnyArray, ""]
     ) -> "Hypotheses":
         """With the reward that leaves the window as information, to first order around each hypothesis."""
 
-        def one(amount, information, past):
+        def one(amount, root, aim, past):
             error, slope = jax.value_and_grad(lambda a: surprise(expert, state, reward, a))(amount)
-            information = FADING * information + jnp.where(leaves, jnp.outer(slope, slope), 0.0)
-            return information, FADING * past + jnp.where(leaves, 0.5 * error**2, 0.0)
+            row = jnp.where(leaves, jnp.append(slope, slope @ amount - error), 0.0)
+            whole = root_of(FADING**0.5 * jnp.concatenate([root, aim[:, None]], axis=1), row[None])
+            return whole[:-1, :-1], whole[:-1, -1], FADING * past + 0.5 * whole[-1, -1] ** 2
 
-        information, past = jax.vmap(one)(self.amounts, self.information, self.past)
-        return Hypotheses(self.amounts, information, past, self.variance, self.cost)
+        root, aim, past = jax.vmap(one)(self.amounts, self.root, self.aim, self.past)
+        return Hypotheses(self.amounts, root, aim, past, self.honest, self.cost, self.volume)
 
     def forgetting(self, forget: Bool[AnyArray, ""]) -> "Hypotheses":
         """As places to begin from alone, where all is to be forgotten."""
         past = jnp.where(forget & jnp.isfinite(self.past), 0.0, self.past)
-        return Hypotheses(self.amounts, jnp.where(forget, 0.0, self.information), past, self.variance, self.cost)
+        root, aim = (jnp.where(forget, 0.0, each) for each in (self.root, self.aim))
+        return Hypotheses(self.amounts, root, aim, past, self.honest, self.cost, self.volume)
+
+    def spread(self, expert: Expert) -> Float[Array, " amount"]:
+        """Variances of the amounts by which the place is in as much doubt as it is: around the likeliest, the others
+        counted as likely as they are.
+
+        A belief has variances alone, and amounts hang together: their own would leave a heading in doubt whose length,
+        which means nothing, is unknown. So they are scaled, each by what it adds (as in Richardson 1972 and Lucy 1974).
+        """
+        chance = jax.nn.softmax(self.volume - self.cost)
+        places, slopes = expert.place(self.amounts), jax.vmap(jax.jacfwd(expert.place))(self.amounts)
+        within = jax.vmap(variance_along)(jnp.asarray(self.honest), slopes)
+        around = within + apart(places, places[0], expert.fields, expert.scales) ** 2
+        wanted = jnp.sum(jnp.where(chance[:, None] > 0, chance[:, None] * around, 0.0), axis=0)
+        adds = slopes[0] ** 2
+        variance = variance_along(self.honest[0], jnp.eye(len(self.amounts[0]))) + LEAST
+        for _ in range(SCALED):
+            share = wanted / (adds @ variance + TINY)
+            variance = variance * (share @ adds) / (jnp.sum(adds, axis=0) + TINY) + LEAST
+        return variance
 
 
 def no_hypotheses(shape: tuple[int, ...], amounts: int) -> Hypotheses:
@@ -61,9 +90,11 @@ def no_hypotheses(shape: tuple[int, ...], amounts: int) -> Hypotheses:
     return Hypotheses(
         jnp.zeros((*shape, KEPT, amounts)),
         jnp.zeros((*shape, KEPT, amounts, amounts)),
+        jnp.zeros((*shape, KEPT, amounts)),
         jnp.full((*shape, KEPT), jnp.inf),
-        jnp.ones((*shape, KEPT, amounts)),
+        jnp.broadcast_to(jnp.eye(amounts), (*shape, KEPT, amounts, amounts)),
         jnp.full((*shape, KEPT), jnp.inf),
+        jnp.zeros((*shape, KEPT)),
     )
 
 
@@ -74,24 +105,30 @@ def explain(
     the places are refined, and the likeliest that differ are kept. `fresh` is the past of one that is new.
     """
     size = guess.mean.shape[-1]
-    new = jnp.stack([guess.mean, all_over(heard.expert, size)[decision % STARTS]])
+    tried = all_over(heard.expert, size)[(TRIED * decision + jnp.arange(TRIED)) % STARTS]
+    new = jnp.concatenate([guess.mean[None], tried])
     begin = jnp.concatenate([before.amounts, new])
-    information = jnp.concatenate([before.information, jnp.zeros((len(new), size, size))])
+    root = jnp.concatenate([before.root, jnp.zeros((len(new), size, size))])
+    aim = jnp.concatenate([before.aim, jnp.zeros((len(new), size))])
     past = jnp.concatenate([before.past, jnp.full(len(new), fresh)])
     precision = 1 / (GUESS_DEVIATIONS * jnp.sqrt(guess.variance))
-    ended = jax.vmap(lambda start, known: refine(heard, start, Known(start, known, guess.mean, precision)))(
-        begin, information
-    )
+
+    def refined(start, root, aim):
+        return refine(heard, start, Known(root, aim, guess.mean, precision))
+
+    ended = jax.vmap(refined)(begin, root, aim)
     cost = ended.cost + past
     cost = jnp.where(jnp.isfinite(cost), cost, jnp.inf)
     chosen, costs = _likeliest_apart(ended, cost)
     costs = jnp.where(costs < costs[0] + HOPELESS, costs, jnp.inf)
     return Hypotheses(
         amounts=ended.amount[chosen],
-        information=information[chosen],
+        root=root[chosen],
+        aim=aim[chosen],
         past=jnp.where(jnp.isfinite(costs), past[chosen], jnp.inf),
-        variance=jnp.clip(_variances(ended.information[chosen]), 1e-9, guess.variance),
+        honest=ended.honest[chosen],
         cost=costs,
+        volume=jax.vmap(_volume)(ended.root[chosen]),
     )
 
 
@@ -103,14 +140,14 @@ def _likeliest_apart(ended: Refined, cost: Float[Array, " candidate"]):
         chosen.append(best)
         costs.append(cost[best])
         off = ended.amount - ended.amount[best]
-        squared = jnp.einsum("ni,ij,nj->n", off, ended.information[best], off)
+        squared = jnp.sum((off @ ended.root[best].T) ** 2, axis=-1)
         cost = jnp.where(squared > APART**2, cost, jnp.inf)
     return jnp.stack(chosen), jnp.stack(costs)
 
 
-def _variances(information: Float[Array, "kept amount amount"]) -> Float[Array, "kept amount"]:
-    covariance = jnp.linalg.inv(information + RIDGE * jnp.eye(information.shape[-1]))
-    return jnp.diagonal(covariance, axis1=-2, axis2=-1)
+def _volume(root: Float[Array, "amount amount"]) -> Float[Array, ""]:
+    """By Laplace's approximation, beside amounts as they are before anything is heard: a unit Gaussian (thesis 5.6)."""
+    return -0.5 * log_determinant(root_of(root, jnp.eye(root.shape[-1])))
 
 
 def all_over(expert: Expert, size: int) -> Float[AnyArray, "start amount"]:

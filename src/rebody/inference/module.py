@@ -190,6 +190,6 @@ def _explained(
     """
     sigma = jnp.exp(0.5 * predicted.log_variance)
     own = jnp.log1p(-changed) + predicted.log_likelihood(wanted) - 0.5 * jnp.log(2 * jnp.pi)
-    other = jnp.log(jnp.maximum(changed, 1e-9)) - jnp.log(OTHER_TASKS_PAY)
+    other = jnp.log(changed) - jnp.log(OTHER_TASKS_PAY)
     either = jnp.logaddexp(own, other)
     return jax.lax.stop_gradient(jnp.exp(own - either)), -jax.lax.stop_gradient(sigma) * either

@@ -25,7 +25,7 @@ SURPRISED, MORE_THAN_GUESS = 6.0, 1.5
 many times as far as from what the encoder's guess does; or where no hypothesis is nearer to the whole window."""
 NEW = 10.0
 """What a new hypothesis pays for the past that others have explained [nats]."""
-UNLIKELIEST = -4.0
+UNLIKELIEST = -1.0
 """Log-probability that the encoder leaves every family at least: it is often too sure."""
 SUREST = -8.0
 """Least log-probability that a belief tells of a family: beyond, its kinds would lie far from all that is learned."""
@@ -112,7 +112,7 @@ class Sharpened(eqx.Module):
             explain(Heard(expert, decoder.read(expert, states), rewards, is_heard), each, own_guess, fresh, heard)
             for expert, each, own_guess in zip(decoder.experts, hypotheses, guesses, strict=True)
         )
-        sharp = self._belief(guess, log_share, hypotheses)
+        sharp = self._belief(guess, log_share, hypotheses, heard <= window)
         belief = jax.tree.map(lambda first, then: jnp.where(heard < FIRST_SHARP, first, then), guess, sharp)
         return (states, rewards, heard, hypotheses), belief
 
@@ -143,17 +143,19 @@ class Sharpened(eqx.Module):
         in_window = jnp.stack([jnp.min(each.cost - past) for each, past in zip(hypotheses, pasts, strict=True)])
         return jnp.min(in_window) > 0.5 * SURPRISED**2 * jnp.minimum(heard, self._window)
 
-    def _belief(self, guess: Belief, log_share, hypotheses: Sequence[Hypotheses]) -> Belief:
+    def _belief(self, guess: Belief, log_share, hypotheses: Sequence[Hypotheses], is_all: Bool[Array, ""]) -> Belief:
         """The likeliest hypothesis of each expert, and kinds that say how likely each family is by the evidence."""
         kind, choice = guess.mean[: self.decoder.kinds], self.decoder.choice
         if choice is not None:
-            evidence = jnp.maximum(log_share, UNLIKELIEST) - jnp.stack([each.cost[0] for each in hypotheses])
+            explained = jnp.stack([jnp.where(is_all, each.volume[0], 0.0) - each.cost[0] for each in hypotheses])
+            evidence = jnp.maximum(log_share, UNLIKELIEST) + explained
             logits = jnp.asarray(choice(kind))
             kind = kind + (self._wanted(logits, log_share, evidence) - logits) @ jnp.linalg.pinv(choice.weights[0])
+        spreads = [each.spread(expert) for expert, each in zip(self.decoder.experts, hypotheses, strict=True)]
         mean = jnp.concatenate([kind, *(each.amounts[0] for each in hypotheses)])
         return Belief(
             mean,
-            jnp.concatenate([guess.variance[: self.decoder.kinds], *(each.variance[0] for each in hypotheses)]),
+            jnp.concatenate([guess.variance[: self.decoder.kinds], *spreads]),
         )
 
     def _wanted(

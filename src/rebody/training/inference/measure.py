@@ -14,12 +14,14 @@ from rebody.bodies.toys import Toy
 from rebody.inference.contract import Contract
 from rebody.inference.probe import Probe, fit_probe
 from rebody.inference.reader import PlaceReader
+from rebody.inference.sharpened import can_sharpen
 from rebody.tasks import Family, FamilySet
 from rebody.tasks.figures import Series
 from rebody.tasks.quantities import length
 from rebody.training.held_out import errors_of
 from rebody.training.inference.clusters import agreement, draw, new_mixture
 from rebody.training.inference.config import MetaConfig
+from rebody.training.inference.coverage import coverage
 from rebody.training.inference.episodes import ToyWorld
 from rebody.types import DECISION_DT, Task
 
@@ -29,6 +31,8 @@ PROBED_FROM = 20
 """A probe is fitted on the beliefs from this decision on."""
 SHARP_AT = 50
 """Decisions after which a target should read out sharply, whatever disturbs the toy."""
+NOISES = (0.0, 0.01)
+"""Standard deviations of noise on rewards, in their unit, with which coverage is measured."""
 CLUSTERED = (2_000, 10_000)
 """Beliefs of a fit of the mixture."""
 
@@ -61,14 +65,15 @@ def measure(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) 
 
 
 def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
-    """`measure`, and: the return with the exact posterior, sharpness on disturbed toys, changes of the task, and
-    clusters where there is a mixture."""
+    """`measure`, and: the return with the exact posterior, sharpness on disturbed toys, coverage of sharpened
+    beliefs, changes of the task, and clusters where there is a mixture."""
     probe, outcome = reader(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
     figures = outcome.figures
     for kind in ("bayes", "oracle"):
         figures[f"{kind} return"] = act(kind, parts, toy, config, held_out).total_return
     figures |= _readings(probe, outcome)
     figures |= _sharpness(probe, act("reuse", parts, toy, config, held_out, disturbed=True))
+    figures |= _coverage(parts, toy, config, held_out)
     figures |= _changes(probe, act("reuse", parts, toy, config, held_out, switch_share=1.0))
     return figures | (_clusters(outcome, config) if config.prior == "mixture" else {})
 
@@ -83,14 +88,17 @@ def act(
     seed: int = 2,
     disturbed: bool = False,
     switch_share: float = 0.0,
+    reward_noise: float = 0.0,
+    sharpen: bool = False,
 ) -> Outcome:
-    """An agent of a named kind on held-out tasks; the seeds are none that training uses."""
+    """An agent of a named kind on held-out tasks; the seeds are none that training uses. Beliefs are sharpened where
+    that is asked for, and where the policy goes by tasks."""
     key, decisions = jax.random.fold_in(jax.random.key(2**31 - 1), seed), round(config.held_out_s / DECISION_DT)
     world = ToyWorld(config.families, config.randomisation)
     tasks, disturbance = world.draw(key, held_out, decisions, switch_share, disturbed=disturbed)
     inference = Inference("in training", contract_of(config), parts, toy)
-    agent = build_agent(kind, inference, tasks, horizon=1, sharpen=config.acts_by == "task")
-    episodes = rollout_on_toy(agent, toy, tasks, config.families, disturbance)
+    agent = build_agent(kind, inference, tasks, horizon=1, sharpen=sharpen or config.acts_by == "task")
+    episodes = rollout_on_toy(agent, toy, tasks, config.families, disturbance, reward_noise)
     return Outcome(config.families, *jax.tree.map(np.asarray, (tasks, episodes)))
 
 
@@ -139,6 +147,21 @@ def _sharpness(probe: Probe | PlaceReader, outcome: Outcome) -> dict[str, float]
         f"{family.name} read, disturbed": float(np.median(length(missed[SHARP_AT])))
         for family, missed, _ in _by_family(probe, outcome)
     }
+
+
+def _coverage(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
+    """How often sharpened beliefs cover the truth, with exact rewards and with noisy ones; none where beliefs cannot be
+    sharpened."""
+    module = parts.module
+    if not can_sharpen(module.encoder, module.decoder, config.families):
+        return {}
+    figures, places = {}, PlaceReader(module.decoder, config.families)
+    for noise in NOISES:
+        outcome = act("reuse", parts, toy, config, held_out, sharpen=True, reward_noise=noise)
+        heard = f", noise {noise:g}" if noise else ""
+        shares = coverage(places, config.families, outcome.tasks, outcome.episodes.belief)
+        figures |= {f"{name}{heard}": share for name, share in shares.items()}
+    return figures
 
 
 def _changes(probe: Probe | PlaceReader, outcome: Outcome) -> dict[str, float]:
