@@ -33,6 +33,8 @@ SHARP_AT = 50
 """Decisions after which a target should read out sharply, whatever disturbs the toy."""
 NOISES = (0.0, 0.01)
 """Standard deviations of noise on rewards, in their unit, with which coverage is measured."""
+FEW = 100
+"""Held-out tasks of an exact posterior by particles: it costs as much as a hundred beliefs."""
 CLUSTERED = (2_000, 10_000)
 """Beliefs of a fit of the mixture."""
 
@@ -69,13 +71,21 @@ def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig, held_o
     beliefs, changes of the task, and clusters where there is a mixture."""
     probe, outcome = reader(parts, toy, config, held_out), act("reuse", parts, toy, config, held_out)
     figures = outcome.figures
-    for kind in ("bayes", "oracle"):
-        figures[f"{kind} return"] = act(kind, parts, toy, config, held_out).total_return
+    figures |= _beside_the_exact_posterior(parts, toy, config, held_out)
+    figures["oracle return"] = act("oracle", parts, toy, config, held_out).total_return
     figures |= _readings(probe, outcome)
     figures |= _sharpness(probe, act("reuse", parts, toy, config, held_out, disturbed=True))
     figures |= _coverage(parts, toy, config, held_out)
     figures |= _changes(probe, act("reuse", parts, toy, config, held_out, switch_share=1.0))
     return figures | (_clusters(outcome, config) if config.prior == "mixture" else {})
+
+
+def _beside_the_exact_posterior(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int) -> dict[str, float]:
+    """Its return; by particles on few tasks, with what beliefs get on the same."""
+    if config.families.size == 1 or held_out <= FEW:
+        return {"bayes return": act("bayes", parts, toy, config, held_out).total_return}
+    returns = {kind: act(kind, parts, toy, config, FEW).total_return for kind in ("bayes", "reuse")}
+    return {f"{kind} return, {FEW} held-out tasks": value for kind, value in returns.items()}
 
 
 def act(

@@ -35,7 +35,10 @@ def save_inference(parts: InferenceParts, toy: Toy, config: MetaConfig, run: Run
         for figure in ("median", "p95", "read, disturbed")
     }
     condition = f"{held_out} held-out tasks, {config.held_out_s:g} s on the toy"
-    rows = {f"{name}, {condition}": f"{value:.5g} {units.get(name, '')}".rstrip() for name, value in figures.items()}
+    rows = {
+        name if "held-out" in name else f"{name}, {condition}": f"{value:.5g} {units.get(name, '')}".rstrip()
+        for name, value in figures.items()
+    }
     steps = run.iterations * config.episodes * config.decisions
     what = (
         f"Inference module (encoder, decoder, probe) and the toy's high-level policy, trained on a point mass "
