@@ -13,6 +13,7 @@ from rebody.bodies.batch import RobotBatch
 from rebody.bodies.check_model import Finding, check_model
 from rebody.bodies.model import NOT_USED, carried_by
 from rebody.bodies.robot import RobotSpec
+from rebody.bodies.walking.batch import JointBatch
 from rebody.errors import RebodyError
 from rebody.types import GLOBAL_FIELDS
 
@@ -60,17 +61,23 @@ def _moves_at_random(spec: RobotSpec) -> tuple[bool, str]:
 
 
 def _run(spec: RobotSpec, amplitude: float) -> tuple[bool, str]:
-    rng, batch = np.random.default_rng(0), RobotBatch(spec, COPIES, threads=1)
+    rng, batch = np.random.default_rng(0), _copies(spec, COPIES)
     batch.reset(rng)
     steps, fell_at = round(SECONDS / spec.control_dt), None
     for step in range(steps):
-        batch.step(rng.uniform(-amplitude, amplitude, (batch.size, spec.model.nu)))
+        batch.step(rng.uniform(-amplitude, amplitude, (batch.size, batch.actions)))
         if fell_at is None and batch.fallen.any():
             fell_at = (step + 1) * spec.control_dt
     if not _is_sound(batch.picture_pose()):
         return False, "positions run away: lower the time step"
     fall = "no copy fell" if fell_at is None else f"first of {batch.size} copies fallen after {fell_at:.2g} s"
     return True, f"{SECONDS:g} s, {fall}"
+
+
+def _copies(spec: RobotSpec, size: int) -> RobotBatch:
+    """Moved by its actuators; around its rest pose where a policy of ours is to move them."""
+    learns_to_walk = spec.walking is not None and spec.walking.onnx is None
+    return (JointBatch if learns_to_walk else RobotBatch)(spec, size, threads=1)
 
 
 def _is_sound(qpos: Float[np.ndarray, "robot nq"]) -> bool:
@@ -110,19 +117,19 @@ def _pushed(spec: RobotSpec) -> tuple[bool, str]:
 
 def _speed(spec: RobotSpec, axis: int, field: str) -> float:
     """What a push along an axis reads as [m/s]."""
-    batch = RobotBatch(spec, 1, threads=1)
+    batch = _copies(spec, 1)
     batch.reset(np.random.default_rng(0))
     batch.push(np.eye(2)[[axis]])
     for _ in range(spec.steps_per_decision):
-        batch.step(np.zeros((1, spec.model.nu)))
+        batch.step(np.zeros((1, batch.actions)))
     return float(getattr(batch.observe(), field)[0])
 
 
 def _trained(spec: RobotSpec) -> tuple[bool, str]:
     """All that training calls: what is read is finite, and a saved state continues to the last bit, as does a reset."""
-    rng, batch, twin = np.random.default_rng(0), RobotBatch(spec, COPIES, 1), RobotBatch(spec, COPIES, 1)
+    rng, batch, twin = np.random.default_rng(0), _copies(spec, COPIES), _copies(spec, COPIES)
     batch.reset(rng)
-    actions = rng.uniform(-1, 1, (2, spec.steps_per_decision, COPIES, spec.model.nu))
+    actions = rng.uniform(-1, 1, (2, spec.steps_per_decision, COPIES, batch.actions))
     batch.push(rng.uniform(-1, 1, COPIES))
     _act(batch, actions[0])
     twin.state = batch.state
@@ -132,7 +139,7 @@ def _trained(spec: RobotSpec) -> tuple[bool, str]:
     if not all(np.isfinite(numbers).all() for numbers in read):
         return False, "what is read of it is not finite"
     batch.reset(np.random.default_rng(1))
-    twin = RobotBatch(spec, COPIES, 1)
+    twin = _copies(spec, COPIES)
     twin.reset(np.random.default_rng(1))
     if not np.array_equal(_act(batch, actions[0]), _act(twin, actions[0])):
         return False, "after a reset it does not move as a new one: the model keeps some of its state"

@@ -16,6 +16,7 @@ from rebody.bodies.model import Space
 from rebody.bodies.robot import Fall, Reach, RobotSpec
 from rebody.bodies.walking.joystick import NAVIGATED_M, Joystick
 from rebody.bodies.walking.settings import Phase, Term, Walking
+from rebody.bodies.walking.trained import TrainedPolicy, WalkingSettings
 from rebody.errors import RebodyError, unknown
 from rebody.names import ROBOTS, shipped_robots
 from rebody.ranges import Box
@@ -50,13 +51,14 @@ class _Joystick(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     forward: tuple[float, float]
     sideways: tuple[float, float]
     turn: tuple[float, float]
-    dead: tuple[float, float, float] = Joystick.dead
-    drift: tuple[float, float, float] = Joystick.drift
+    dead: tuple[float, float, float] | None = None
+    drift: tuple[float, float, float] | None = None
 
 
 class _Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    onnx: str
     joystick: _Joystick
+    onnx: str | None = None
+    artifact: str | None = None
     inputs: tuple[Term, ...] = ()
     imu: str | None = None
     action_scale: float | tuple[float, ...] | None = None
@@ -69,6 +71,7 @@ class _Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     phase: _Phase | None = None
     stiffness: tuple[float, ...] = ()
     damping: tuple[float, ...] = ()
+    mirror: tuple[str, ...] = ()
 
 
 class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -149,7 +152,7 @@ def _with_variables(said: str, path: Path) -> str:
 
 def _walking(policy: _Policy, path: Path) -> Walking:
     """RebodyError for what cannot be."""
-    said, stick = msgspec.structs.asdict(policy), policy.joystick
+    stick, artifact = policy.joystick, _artifact(policy, path)
     problems = [
         f"{name} must be at least {least}, and finite"
         for name, value, least in (("history", policy.history, 1), ("phase.frequency", _frequency(policy), 0))
@@ -158,20 +161,37 @@ def _walking(policy: _Policy, path: Path) -> Walking:
     ways = (stick.forward, stick.sideways, stick.turn)
     if not all(-math.inf < low <= 0 <= high < math.inf for low, high in ways):
         problems.append("joystick: each way must be [low, high] around 0")
-    if not all(0 <= slowest < math.inf for slowest in stick.dead):
+    if not all(0 <= slowest < math.inf for slowest in stick.dead or ()):
         problems.append("joystick.dead must not be negative")
+    if policy.onnx is not None and artifact is not None:
+        problems.append("onnx and artifact are two policies: say one")
     if problems:
         raise RebodyError(f"'{path}': [policy] {'; '.join(problems)}.")
     low, high = zip(*ways, strict=True)
+    measured = _measured(artifact)
     return Walking(
-        **said
+        **msgspec.structs.asdict(policy)
         | {
-            "onnx": path.parent / _with_variables(policy.onnx, path),
-            "joystick": Joystick(Box(low, high), stick.dead, stick.drift),
+            "onnx": None if policy.onnx is None else path.parent / _with_variables(policy.onnx, path),
+            "artifact": artifact,
+            "joystick": Joystick(Box(low, high), stick.dead or measured.dead, stick.drift or measured.drift),
             "scales": tuple(policy.scales.items()),
             "phase": policy.phase and Phase(**msgspec.structs.asdict(policy.phase)),
         }
     )
+
+
+def _artifact(policy: _Policy, path: Path) -> str | None:
+    """A shipped name as it is, a folder from where the description is."""
+    if policy.artifact is None or "/" not in policy.artifact:
+        return policy.artifact
+    return str(path.parent / _with_variables(policy.artifact, path))
+
+
+def _measured(artifact: str | None) -> WalkingSettings | type[Joystick]:
+    """What says how a policy takes slow commands: its artifact, where there is one by now."""
+    policy = None if artifact is None else TrainedPolicy(artifact)
+    return policy.settings if policy and policy.is_there else Joystick
 
 
 def _frequency(policy: _Policy) -> float:

@@ -68,7 +68,7 @@ def test_joints_are_heard_from_the_rest_pose_in_the_order_asked_for(moving, tmp_
     numbers = heard(policy, moving.qpos[None], moving.qvel[None])[0]
     expected = [0.9 + 0.2, 0.5 - 0.3, moving.qvel[7], moving.qvel[6], *2 * COMMAND[0]]
     np.testing.assert_allclose(numbers, expected, atol=1e-9)
-    np.testing.assert_array_equal(policy.actuators, [1, 0])
+    np.testing.assert_array_equal(policy.joints.actuators, [1, 0])
     deaf = policy_of(tmp_path, inputs, 7, unheard=("left",))
     np.testing.assert_allclose(
         heard(deaf, moving.qpos[None], moving.qvel[None])[0][:4], [0.0, 1.1, 0.0, moving.qvel[7]], atol=1e-9
@@ -109,7 +109,7 @@ def test_a_history_is_told_term_by_term_the_oldest_first(moving, tmp_path):
     gait = policy.begin(1)
     policy.step(gait, moving.qpos[None], moving.qvel[None], COMMAND, 0.02)
     policy.step(gait, moving.qpos[None], moving.qvel[None], 2 * COMMAND, 0.02)
-    np.testing.assert_allclose(policy._stacked(gait.heard)[0], [*COMMAND[0], *2 * COMMAND[0], 0.7, 0.7])
+    np.testing.assert_allclose(policy.joints._stacked(gait.heard)[0], [*COMMAND[0], *2 * COMMAND[0], 0.7, 0.7])
 
 
 def test_what_mjlab_writes_is_read_from_the_file(moving, tmp_path):
@@ -127,7 +127,7 @@ def test_what_mjlab_writes_is_read_from_the_file(moving, tmp_path):
     np.testing.assert_allclose(gait.heard[0, -1, :3], moving.qvel[3:6], atol=1e-9)
     np.testing.assert_allclose(targets[0], [0.1 + 0.5 * moving.qvel[3], 0.2 + 0.25 * moving.qvel[4]], atol=1e-6)
     model = mujoco.MjModel.from_xml_string(CART)
-    policy.drive(model)
+    policy.joints.drive(model)
     np.testing.assert_array_equal(model.actuator_gainprm[:, 0], [30.0, 20.0])
     np.testing.assert_array_equal(model.actuator_biasprm[:, :3], [[0.0, -30.0, -2.0], [0.0, -20.0, -1.0]])
 

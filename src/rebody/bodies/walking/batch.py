@@ -1,33 +1,90 @@
-"""Robots that walk by a policy of their own: a body whose action is the joystick."""
+"""Robots that walk by a policy: bodies whose action is where their joints go, or the joystick."""
+
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from rebody.bodies.batch import RobotBatch
 from rebody.bodies.robot import RobotSpec
+from rebody.bodies.walking.joints import Gait, JointInterface
 from rebody.bodies.walking.joystick import WAYS, navigator_sees
-from rebody.bodies.walking.policy import Gait, WalkingPolicy
+from rebody.bodies.walking.policy import WalkingPolicy
+from rebody.errors import RebodyError
 
 
-class WalkingBatch(RobotBatch):
-    """Many copies of one. An action is forward, sideways and turn, each in [-1, 1] of what the robot can; a step is a
-    control step of its policy.
+class GaitBatch(RobotBatch):
+    """Many copies of a robot whose joints are servos, and what is remembered of each one's gait."""
+
+    def __init__(self, spec: RobotSpec, size: int, threads: int, joints: JointInterface):
+        self.joints = joints
+        joints.drive(spec.model)
+        super().__init__(spec, size, threads)
+        self.gait: Gait = self._begin(size)
+
+    def reset(self, rng, who=None):
+        """As any robot; its gait is forgotten."""
+        super().reset(rng, who)
+        ids, fresh = self._ids(who), self._begin(1)
+        for mine, new in zip(self.gait.parts(), fresh.parts(), strict=True):
+            mine[ids] = new
+
+    @property
+    def state(self):
+        """That of any robot, and what is remembered of its gait."""
+        return np.concatenate([super().state, *(part.reshape(self.size, -1) for part in self.gait.parts())], axis=1)
+
+    @state.setter
+    def state(self, value):
+        parts = self.gait.parts()
+        ends = np.cumsum([part[0].size for part in parts])
+        own, *rest = np.split(value, value.shape[1] - ends[-1] + np.array([0, *ends[:-1]]), axis=1)
+        RobotBatch.state.__set__(self, own)
+        for part, saved in zip(parts, rest, strict=True):
+            part[:] = saved.reshape(part.shape)
+
+    def _begin(self, robots: int) -> Gait:
+        return self.joints.begin(robots)
+
+    def _move(self, targets: Float[np.ndarray, "robot joint"]) -> None:
+        """A control step with joints on their way to these positions [rad]."""
+        self._ctrl[:, self.joints.actuators] = targets
+        self._advance()
+
+
+class JointBatch(GaitBatch):
+    """Those that are to learn to walk. An action is where each joint is to be, in [-1, 1] around the rest pose."""
+
+    def __init__(self, spec: RobotSpec, size: int, threads: int = 0):
+        """RebodyError for a robot whose description says nothing of a policy."""
+        super().__init__(spec, size, threads, joint_interface(spec))
+        self.actions = len(self.joints.names)
+
+    def step(self, actions):
+        """Joint targets, for a control step."""
+        action = np.clip(np.asarray(actions, np.float32), -1.0, 1.0)
+        self._move(self.joints.move(self.gait, action, self.spec.control_dt))
+
+    @property
+    def joint_velocities(self) -> Float[np.ndarray, "robot joint"]:
+        """In the order of the actions [rad/s]."""
+        return self.qvel[:, self.joints.moves]
+
+    def hear(self, command: Float[np.ndarray, "robot 3"]) -> Float[np.ndarray, "robot number"]:
+        """What a policy would be shown of them under these commands [m/s, rad/s]."""
+        return self.joints.hear(self.gait, self.qpos, self.qvel, command)
+
+
+class WalkingBatch(GaitBatch):
+    """Those that walk already. An action is forward, sideways and turn, each in [-1, 1] of what the robot can; a step
+    is a control step of its policy.
     """
 
     def __init__(self, spec: RobotSpec, size: int, threads: int = 0):
         assert spec.walking is not None
         self._policy = WalkingPolicy(spec.name, spec.walking, spec.model, spec.rest_qpos, spec.root_body)
-        self._policy.drive(spec.model)
-        super().__init__(spec, size, threads)
+        super().__init__(spec, size, threads, self._policy.joints)
         self.actions, self._joystick = len(WAYS), spec.walking.joystick
-        self._gait: Gait = self._policy.begin(size)
-
-    def reset(self, rng, who=None):
-        """As any robot; the policy forgets."""
-        super().reset(rng, who)
-        ids, fresh = self._ids(who), self._policy.begin(1)
-        for mine, new in zip(self._gait.parts(), fresh.parts(), strict=True):
-            mine[ids] = new
 
     def step(self, actions):
         """The joystick, until the next step."""
@@ -35,24 +92,21 @@ class WalkingBatch(RobotBatch):
 
     def follow(self, command: Float[np.ndarray, "robot 3"]) -> None:
         """A control step under joystick commands as they are [m/s, rad/s]."""
-        targets = self._policy.step(self._gait, self.qpos, self.qvel, command, self.spec.control_dt)
-        self._ctrl[:, self._policy.actuators] = targets
-        self._advance()
+        self._move(self._policy.step(self.gait, self.qpos, self.qvel, command, self.spec.control_dt))
 
     def proprioception(self):
         """How it moves over the last 0.1 s in the frame of its heading, and what it can (`Joystick`)."""
         return navigator_sees(self.observe(), self._joystick.measured, np).astype(np.float32)
 
-    @property
-    def state(self):
-        """That of any robot, and what the policy remembers."""
-        return np.concatenate([super().state, *(part.reshape(self.size, -1) for part in self._gait.parts())], axis=1)
+    def _begin(self, robots: int) -> Gait:
+        return self._policy.begin(robots)
 
-    @state.setter
-    def state(self, value):
-        parts = self._gait.parts()
-        ends = np.cumsum([part[0].size for part in parts])
-        own, *rest = np.split(value, value.shape[1] - ends[-1] + np.array([0, *ends[:-1]]), axis=1)
-        RobotBatch.state.__set__(self, own)
-        for part, saved in zip(parts, rest, strict=True):
-            part[:] = saved.reshape(part.shape)
+
+def joint_interface(spec: RobotSpec) -> JointInterface:
+    """What a policy that is to be learned hears and moves: that of its description, one control step at a time, as it
+    is. RebodyError for a robot whose description says nothing of a policy.
+    """
+    if spec.walking is None:
+        raise RebodyError(f"robot '{spec.name}' follows no joystick: its description has no [policy].")
+    bare = replace(spec.walking, scales=(), clip=None, action_clip=None, history=1, phase=None, unheard=())
+    return JointInterface(spec.name, bare, spec.model, spec.rest_qpos, spec.root_body, {})

@@ -1,6 +1,8 @@
 """What a walking policy makes of commands: reached speeds, dead band, lag, drift and falls, measured on the robot."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -62,15 +64,41 @@ class WalkingMeasured:
         return sum(int(way.fell.sum()) for way in self.ways)
 
 
-def measure_walking(spec: RobotSpec) -> WalkingMeasured:
-    """A robot for each command of each way, all from rest, for 6 s; RebodyError where one diverges."""
+@runtime_checkable  # tests check types as they run
+class Follower(Protocol):
+    """Robots that follow a joystick."""
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Put them at rest."""
+        ...
+
+    def follow(self, command: Float[np.ndarray, "robot 3"]) -> None:
+        """A control step under commands [m/s, rad/s]."""
+        ...
+
+    def pose(self) -> Float[np.ndarray, "robot 6"]:
+        """As `Simulation.pose`."""
+        ...
+
+    @property
+    def fallen(self) -> Bool[np.ndarray, " robot"]:
+        """As `Simulation.fallen`."""
+        ...
+
+
+def measure_walking(spec: RobotSpec, followers: Callable[[int], Follower] | None = None) -> WalkingMeasured:
+    """A robot for each command of each way, all from rest, for 6 s; RebodyError where one diverges.
+
+    `followers` makes so many of them, where they do not walk by the policy of their description.
+    """
     assert spec.walking is not None
     limits, commands = spec.walking.joystick.limits, [np.zeros(len(WAYS))]
     for way in range(len(WAYS)):
         for end in (limits.low[way], limits.high[way]):
             commands += [share * end * np.eye(len(WAYS))[way] for share in SHARES if end]
     command = np.array(commands)
-    speeds, fell = _walk(spec, command)
+    batch = WalkingBatch(spec, len(command)) if followers is None else followers(len(command))
+    speeds, fell = _walk(batch, command, spec.control_dt)
     settled = speeds[round(SETTLES_S / spec.control_dt) :].mean(axis=0)
     ahead = int(np.argmax(command[:, 0]))
     window = max(1, round(GAIT_S / spec.control_dt))
@@ -79,16 +107,15 @@ def measure_walking(spec: RobotSpec) -> WalkingMeasured:
     return WalkingMeasured(tuple(_way(i, command, settled, fell) for i in range(len(WAYS))), settled[0], float(lag))
 
 
-def _walk(spec: RobotSpec, command: Float[np.ndarray, "robot 3"]):
-    """Speeds in the frame of the heading at each control step [m/s, rad/s], and who fell."""
-    batch = WalkingBatch(spec, len(command))
+def _walk(batch: Follower, command: Float[np.ndarray, "robot 3"], dt: float):
+    """Speeds in the frame of the heading at each control step of `dt` seconds [m/s, rad/s], and who fell."""
     batch.reset(np.random.default_rng(0))
     speeds, fell, before = [], np.zeros(len(command), bool), batch.pose()
-    for _ in range(round((SETTLES_S + LASTS_S) / spec.control_dt)):
+    for _ in range(round((SETTLES_S + LASTS_S) / dt)):
         batch.follow(command)
         now = batch.pose()
         moved = in_heading(now[:, :2] - before[:, :2], before[:, 5])
-        speeds.append(np.column_stack([moved, wrap_angle(now[:, 5] - before[:, 5])]) / spec.control_dt)
+        speeds.append(np.column_stack([moved, wrap_angle(now[:, 5] - before[:, 5])]) / dt)
         fell, before = fell | batch.fallen, now
     return np.array(speeds), fell
 

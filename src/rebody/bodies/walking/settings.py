@@ -22,6 +22,19 @@ world's (0, 0, -1) in it, the joystick command, joints relative to the rest pose
 then sines of the gait's phases, and the root's height above the floor [m]."""
 
 
+MJLAB: dict[str, Term] = {
+    "base_lin_vel": "linear_velocity",
+    "base_ang_vel": "angular_velocity",
+    "projected_gravity": "gravity",
+    "joint_pos": "joint_positions",
+    "joint_vel": "joint_velocities",
+    "actions": "last_action",
+    "command": "command",
+    "velocity_commands": "command",
+}
+"""What mjlab and Isaac Lab call them in a file's metadata."""
+
+
 @dataclass(frozen=True)
 class Phase:
     """A clock that the gait goes by."""
@@ -36,11 +49,13 @@ class Phase:
 
 @dataclass(frozen=True)
 class Walking:
-    """A policy that follows a joystick, and what it hears and moves."""
+    """A policy that follows a joystick, and what it hears and moves; or the one that such a robot is to learn."""
 
-    onnx: Path
+    onnx: Path | None
     """Its file: one input of observations, one output of actions, and memory `NAME_in`, `NAME_out` where it has any."""
     joystick: Joystick
+    artifact: str | None = None
+    """One that was learned here, a shipped name or a folder, which says by itself what it hears and moves."""
     inputs: tuple[Term, ...] = ()
     """In their order; none for what the file's own metadata say (mjlab)."""
     imu: str | None = None
@@ -64,3 +79,6 @@ class Walking:
     """PD gains of each joint where the model has motors [N m/rad]; none for the model's own actuators."""
     damping: tuple[float, ...] = ()
     """[N m s/rad]"""
+    mirror: tuple[str, ...] = ()
+    """Where left and right are alike: for each joint the one whose place it takes in a mirror, behind a minus where it
+    turns the other way. A policy that is learned here then learns both sides at once."""

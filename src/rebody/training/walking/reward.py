@@ -1,0 +1,83 @@
+"""What a walking policy is paid for a control step."""
+
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Bool, Float
+
+from rebody.bodies.walking.joints import NO_COMMAND
+from rebody.ranges import NotNegative, Positive, Share
+from rebody.types import AnyArray
+
+
+class Stride(eqx.Module):
+    """How a robot moved in a control step."""
+
+    speed: Float[AnyArray, "*batch 3"]  # half of the step's, half of a running mean's [m/s, m/s, rad/s]
+    tilt: Float[AnyArray, "*batch"]  # 1 - cos of the angle between the root's up and the world's
+    height: Float[AnyArray, "*batch"]  # of the root, as a share of that in the rest pose
+    stir: Float[AnyArray, "*batch"]  # mean squared joint velocity [rad^2/s^2]
+    fell: Bool[AnyArray, "*batch"]
+
+
+@dataclass(frozen=True)
+class WalkingReward:
+    """Weights of what a walking policy is paid."""
+
+    relative: NotNegative = 0.6
+    """Paid in full at the wanted speed, less by the error relative to it: what makes a robot set out."""
+    slowest: Positive = 0.4
+    """Least speed that errors are relative to [m/s]."""
+    speed: NotNegative = 0.4
+    """Paid in full at the wanted speed, less by a Gaussian of the error: what makes it precise."""
+    speed_width: Positive = 0.17
+    """Standard deviation of that Gaussian [m/s]."""
+    turn: NotNegative = 0.4
+    """Paid in full at the wanted turn, less by a Gaussian of the error."""
+    turn_width: Positive = 0.27
+    """Standard deviation of that Gaussian [rad/s]."""
+    turn_error: NotNegative = 0.08
+    """Per rad/s from the wanted turn: what pulls from far away."""
+    tilt: NotNegative = 1.0
+    """Times the tilt."""
+    change: NotNegative = 0.15
+    """Times the mean squared change of the action."""
+    effort: NotNegative = 0.02
+    """Times the mean squared action."""
+    crouch: NotNegative = 1.5
+    """Times the height that is missing, as a share, beyond the one that is free."""
+    crouch_free: Share = 0.15
+    """Share of the height that may be missing."""
+    stir: NotNegative = 0.03
+    """Times the mean squared joint velocity while none is commanded: who is told nothing stands still."""
+    alive: NotNegative = 0.2
+    """Paid as long as it has not fallen."""
+    fall: NotNegative = 1.0
+    """Price of a fall."""
+
+
+def walking_reward(
+    command: Float[AnyArray, "*batch 3"],
+    stride: Stride,
+    action: Float[AnyArray, "*batch joint"],
+    last_action: Float[AnyArray, "*batch joint"],
+    weights: WalkingReward,
+) -> Float[AnyArray, "*batch"]:
+    """Pay for one control step under a joystick command [m/s, m/s, rad/s]."""
+    error = stride.speed - command
+    miss = jnp.sqrt(jnp.sum(error[..., :2] ** 2, axis=-1) + 1e-6)
+    wanted, turn = jnp.linalg.norm(command[..., :2], axis=-1), jnp.abs(error[..., 2])
+    is_none = jnp.linalg.norm(command, axis=-1) < NO_COMMAND
+    follows = (
+        weights.relative * jnp.maximum(1 - miss / jnp.maximum(wanted, weights.slowest), -0.5)
+        + weights.speed * jnp.exp(-0.5 * (miss / weights.speed_width) ** 2)
+        + weights.turn * jnp.exp(-0.5 * (turn / weights.turn_width) ** 2)
+        - weights.turn_error * turn
+    )
+    posture = weights.tilt * stride.tilt + weights.crouch * jnp.maximum(1 - weights.crouch_free - stride.height, 0.0)
+    effort = weights.effort * jnp.mean(action**2, axis=-1) + weights.change * jnp.mean(
+        (action - last_action) ** 2, axis=-1
+    )
+    stir = weights.stir * is_none * jnp.minimum(stride.stir, 20.0)
+    return follows - posture - effort - stir + weights.alive - weights.fall * stride.fell

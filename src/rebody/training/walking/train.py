@@ -1,0 +1,245 @@
+"""Training a walking policy with soft actor-critic: (what a robot feels, joystick command) -> joint targets.
+
+Many robots follow changing commands; half of every batch is learned from under commands that were never given, and half
+of it as a mirror shows it, where left and right are alike.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, PRNGKeyArray
+
+from rebody.bodies import RobotBatch
+from rebody.bodies.attitude import in_heading, wrap_angle
+from rebody.bodies.walking.batch import JointBatch, joint_interface
+from rebody.control.command import YAW
+from rebody.control.sac import Actor, SACBatch, SACState
+from rebody.jax_settings import own_jax_settings
+from rebody.ranges import Box
+from rebody.training.off_policy import Learner, OffPolicyState, explore, learn, ready_robot, train
+from rebody.training.run import Run
+from rebody.training.walking.config import WalkingConfig
+from rebody.training.walking.follower import ActorFollower
+from rebody.training.walking.measure import measure
+from rebody.training.walking.mirror import Mirror, mirror_of
+from rebody.training.walking.report import save_walking
+from rebody.training.walking.reward import Stride, walking_reward
+from rebody.training.walking.scales import input_scales, loaded_actor
+from rebody.types import POSE_FIELDS, AnyArray
+
+HEIGHT, ROLL, PITCH = (POSE_FIELDS.index(name) for name in ("z", "roll", "pitch"))
+
+
+@own_jax_settings()
+def train_walking(
+    robot: str,
+    config: WalkingConfig,
+    out: Path,
+    seed: int,
+    *,
+    resume: bool = False,
+    finish: bool = False,
+    init_from: str | None = None,
+) -> Path:
+    """Train a walking policy; returns the artifact's folder.
+
+    RebodyError if the robot is not ready or follows no joystick, `out` holds another run, or `init_from` has other
+    sizes; Interrupted on Ctrl-C.
+    """
+    spec = ready_robot(robot, config)
+    learner = WalkingLearner(spec, config)
+    return train(learner, out, {"robot": robot, "seed": seed}, resume=resume, finish=finish, init_from=init_from)
+
+
+class ControlSteps(eqx.Module):
+    """Transitions as the replay buffer holds them: the reward follows from the command, which may be another."""
+
+    seen: Float[AnyArray, "*size number"]
+    action: Float[AnyArray, "*size joint"]
+    last_action: Float[AnyArray, "*size joint"]
+    next_seen: Float[AnyArray, "*size number"]
+    stride: Stride
+    command: Float[AnyArray, "*size 3"]
+
+
+class World(eqx.Module):
+    """What is known of the robots beside their physics; arrays are written in place."""
+
+    command: Float[np.ndarray, "robot 3"]
+    steps_left: Float[np.ndarray, " robot"]  # of the command
+    speed: Float[np.ndarray, "robot 3"]  # a running mean [m/s, m/s, rad/s]
+
+
+@dataclass(frozen=True)
+class WalkingLearner(Learner[World]):
+    """(what it feels, joystick command) -> joint targets."""
+
+    name = "walking"
+    config: WalkingConfig
+
+    @property
+    def limits(self) -> Box:
+        """Commands that it is to follow."""
+        assert self.spec.walking is not None
+        return self.spec.walking.joystick.limits
+
+    def simulate(self, size: int) -> JointBatch:
+        """Robots whose actions are joint targets."""
+        return JointBatch(self.spec, size)
+
+    def sizes(self, batch: RobotBatch) -> tuple[int, int]:
+        """What it hears, and its joints."""
+        return joint_interface(self.spec).observations, batch.actions
+
+    def row(self, batch: RobotBatch) -> ControlSteps:
+        """What happened, whatever was commanded."""
+        hears, joints = self.sizes(batch)
+        seen, action, way = (np.zeros((1, size), np.float32) for size in (hears, joints, 3))
+        scalar = np.zeros(1, np.float32)
+        return ControlSteps(seen, action, action, seen, Stride(way, scalar, scalar, scalar, np.zeros(1, bool)), way)
+
+    def begin(self, batch: RobotBatch, actor: Actor, key: PRNGKeyArray) -> World:
+        """Robots without commands."""
+        none = np.zeros((batch.size, 3), np.float32)
+        return World(none, np.zeros(batch.size, np.float32), none.copy())
+
+    def collect(
+        self, state: OffPolicyState[World], batch: RobotBatch, rng: np.random.Generator, key: PRNGKeyArray
+    ) -> tuple[World, dict[str, Any]]:
+        """Control steps under changing commands; what they earned, and how often robots fell."""
+        assert isinstance(batch, JointBatch)
+        config, world, scales = self.config, state.world, input_scales(batch.joints)
+        for step in range(config.steps):
+            command_key, action_key = jax.random.split(jax.random.fold_in(key, step))
+            renew(world, self, rng, command_key)
+            push(batch, config, rng)
+            seen, last_action, before = batch.hear(world.command), batch.gait.last_action, batch.pose()
+            action = np.asarray(explore(state.sac.actor, seen * scales, action_key))
+            batch.step(action)
+            stride, command = stride_of(batch, before, world.speed, config), world.command.copy()
+            state.replay.append(ControlSteps(seen, action, last_action, batch.hear(command), stride, command))
+            begin_anew(world, batch, batch.fallen, rng)
+        newest = state.replay.newest(config.steps * config.robots)
+        return world, experience(newest, config, self.spec.control_dt)
+
+    def update(self, policy: SACState, drawn: Any, key: PRNGKeyArray, iteration: int) -> tuple[SACState, dict]:
+        """Half of every batch learns under commands that were never given."""
+        assert self.spec.walking is not None
+        joints = joint_interface(self.spec)
+        mirror = mirror_of(joints, self.spec.walking.mirror, self.spec.name)
+        told = Relabelling(self.config, self.limits, input_scales(joints), command_columns(joints), mirror)
+        return learn(policy, drawn, key, self.config.sac, told)
+
+    def measure(self, actor: Actor) -> dict[str, float]:
+        """Errors, falls."""
+        return measure(ActorFollower(self.spec, self.config.held_out, actor), self.limits, self.config.held_out_s)
+
+    def save(self, actor: Actor, figures: dict[str, float], run: Run) -> Path:
+        """A walking policy's artifact."""
+        return save_walking(actor, self.spec, self.config, run)
+
+    def load_actor(self, artifact: str) -> Actor:
+        """That of a walking policy."""
+        return loaded_actor(artifact, joint_interface(self.spec), self.config.sac)
+
+
+class Relabelling(eqx.Module):
+    """Transitions with their own command or a new one, and the reward that it would have brought, as they were or in a
+    mirror.
+    """
+
+    config: WalkingConfig
+    limits: Box
+    scales: Float[np.ndarray, " number"]
+    columns: Float[np.ndarray, " 3"]  # of an observation, where the command is
+    mirror: Mirror | None
+
+    def __call__(self, steps: ControlSteps, key: PRNGKeyArray) -> SACBatch:
+        """A batch to learn from."""
+        fresh_key, mirror_key = jax.random.split(key)
+        size = len(steps.stride.fell)
+        fresh = self.config.commands.sample(fresh_key, size, self.limits)
+        renewed = (jnp.arange(size) < self.config.relabelled * size)[:, None]
+        command = jnp.where(renewed, fresh, steps.command)
+        seen, next_seen = (jnp.asarray(each).at[:, self.columns].set(command) for each in (steps.seen, steps.next_seen))
+        action = steps.action
+        reward = walking_reward(command, steps.stride, action, steps.last_action, self.config.reward)
+        if self.mirror is not None:  # the reward is the same
+            turned = jax.random.bernoulli(mirror_key, shape=(size, 1))
+            seen, next_seen = (jnp.where(turned, self.mirror.seen(each), each) for each in (seen, next_seen))
+            action = jnp.where(turned, self.mirror.done(action), action)
+        return SACBatch(
+            observation=seen * self.scales,
+            action=action,
+            reward=reward,
+            next_observation=next_seen * self.scales,
+            terminal=steps.stride.fell.astype(jnp.float32),
+        )
+
+
+@eqx.filter_jit
+def experience(seen: ControlSteps, config: WalkingConfig, control_dt: float) -> dict[str, Float[AnyArray, ""]]:
+    """What was earned per control step, and how often robots fell."""
+    reward = walking_reward(seen.command, seen.stride, seen.action, seen.last_action, config.reward)
+    fell = seen.stride.fell
+    return {"reward": reward.mean(), "falls_per_minute": 60 * fell.sum() / (fell.size * control_dt)}
+
+
+def stride_of(
+    batch: JointBatch, before: Float[np.ndarray, "robot 6"], mean: Float[np.ndarray, "robot 3"], config: WalkingConfig
+) -> Stride:
+    """What the control step did that began in the poses `before`; the running mean of the speeds moves on, in place."""
+    pose, dt = batch.pose(), batch.step_s
+    moved = in_heading(pose[:, :2] - before[:, :2], before[:, YAW])
+    speed = np.column_stack([moved, wrap_angle(pose[:, YAW] - before[:, YAW])]) / dt
+    mean += min(1.0, dt / max(config.smoothing_s, dt)) * (speed - mean)
+    numbers = (
+        0.5 * (speed + mean),
+        1 - np.cos(pose[:, ROLL]) * np.cos(pose[:, PITCH]),
+        1 + pose[:, HEIGHT] / batch.spec.torso_height,
+        np.mean(batch.joint_velocities**2, axis=-1),
+    )
+    return Stride(*(each.astype(np.float32) for each in numbers), fell=batch.fallen)
+
+
+def renew(world: World, learner: WalkingLearner, rng: np.random.Generator, key: PRNGKeyArray) -> None:
+    """Count one control step, and give a new command where the old one has run out."""
+    world.steps_left[:] -= 1
+    due = world.steps_left < 0
+    if not due.any():
+        return
+    config, dt = learner.config, learner.spec.control_dt
+    world.command[due] = np.asarray(_draw(key, len(due), learner.limits, config))[due]
+    shortest, longest = (round(seconds / dt) for seconds in config.segment_s)
+    world.steps_left[due] = rng.integers(shortest, longest + 1, due.sum())
+
+
+def push(batch: JointBatch, config: WalkingConfig, rng: np.random.Generator) -> None:
+    """Now and then something changes a robot's speed."""
+    is_pushed = rng.random(batch.size) < batch.spec.control_dt / config.push_every_s
+    batch.push(np.where(is_pushed[:, None], rng.uniform(-config.push, config.push, (batch.size, 2)), 0.0))
+
+
+def begin_anew(world: World, batch: JointBatch, who: Bool[np.ndarray, " robot"], rng: np.random.Generator) -> None:
+    """Robots that have fallen go back to their rest pose, and get a new command."""
+    if not who.any():
+        return
+    batch.reset(rng, who)
+    world.steps_left[who] = 0
+    world.speed[who] = 0.0
+
+
+def command_columns(joints) -> np.ndarray:
+    """Where the command stands in what a policy hears."""
+    ends = np.cumsum([joints.size(term) for term in joints.inputs])
+    return np.arange(3) + ends[joints.inputs.index("command")] - 3
+
+
+@eqx.filter_jit
+def _draw(key: PRNGKeyArray, size: int, limits: Box, config: WalkingConfig):
+    return config.commands.sample(key, size, limits)
