@@ -39,7 +39,7 @@ class WalkingSettings:
     action_scale: tuple[float, ...]
     """Of each joint: radians of an action of 1."""
     stiffness: tuple[float, ...]
-    """PD gains of each joint where motors were made servos [N m/rad]; none where the model has servos."""
+    """PD gains of each joint's servo [N m/rad]; none where it has other actuators."""
     damping: tuple[float, ...]
     """[N m s/rad]"""
     low: Three

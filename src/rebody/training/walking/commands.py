@@ -17,7 +17,7 @@ SLOW = 0.3
 class CommandDistribution:
     """How commands are drawn."""
 
-    ways: tuple[Share, Share, Share] = (0.85, 0.5, 0.5)
+    ways: tuple[Share, Share, Share] = (0.8, 0.5, 0.6)
     """How often a command goes forward or back, sideways, and turns."""
     slow_share: Share = 0.2
     """Share of commands that are slow."""

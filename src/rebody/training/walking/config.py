@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from rebody.control.sac import SACConfig
-from rebody.ranges import Count, NotNegative, Number, Positive, Seconds, Share
+from rebody.ranges import Count, Episodes, NotNegative, Number, Positive, Seconds, Share
 from rebody.training.off_policy import OffPolicyConfig
 from rebody.training.walking.commands import CommandDistribution
 from rebody.training.walking.reward import WalkingReward
@@ -19,6 +19,10 @@ class WalkingConfig(OffPolicyConfig):
     """Iterations from one measurement on held-out commands to the next."""
     held_out_s: Seconds = 6.0
     """Length of the episodes of a measurement [s]; `held_out` is the number of commands."""
+    final_held_out: Episodes = 500
+    """Held-out commands of the figures on the card."""
+    final_s: Seconds = 10.0
+    """How long each is followed; under pushes twice as long [s]."""
     relabelled: Share = 0.5
     """Share of a batch whose commands are drawn anew."""
     segment_s: tuple[Positive, Positive] = (1.0, 8.0)

@@ -15,14 +15,10 @@ from rebody.control.sac import Actor
 from rebody.ranges import Box
 from rebody.training.walking.follower import ActorFollower
 
-COMMANDS, LASTS_S = 500, 10.0
-"""Of the figures on the card, seconds each."""
 SLOW = (0.1, 0.3)
-"""Slow commands, ahead, back and to the sides [m/s]."""
-STANDS_S = 5.0
-"""How long a robot is told nothing [s]."""
-PUSH, PUSH_EVERY_S, STRESSED_S = 0.5, 3.0, 20.0
-"""Of the stress: largest push each way [m/s], how often, how long [s]."""
+"""Slow commands [m/s]."""
+PUSH, PUSH_EVERY_S = 0.5, 3.0
+"""Of the stress: largest push each way [m/s], how often [s]."""
 
 
 class Walk(NamedTuple):
@@ -75,23 +71,23 @@ def measure(batch: ActorFollower, limits: Box, seconds: float) -> dict[str, floa
     return figures
 
 
-def slow_error(spec: RobotSpec, actor: Actor) -> float:
-    """Median error of the speed under slow commands, in any direction over the ground [m/s]."""
+def slow_error(spec: RobotSpec, actor: Actor, size: int, seconds: float) -> float:
+    """Median error of the speed under slow commands in any direction over the ground [m/s]."""
     rng = np.random.default_rng(0)
-    size, bearing = rng.uniform(*SLOW, 100), rng.uniform(-np.pi, np.pi, 100)
-    command = np.column_stack([size * np.cos(bearing), size * np.sin(bearing), np.zeros(100)])
-    walked = walk(ActorFollower(spec, 100, actor), command, LASTS_S)
+    speed, bearing = rng.uniform(*SLOW, size), rng.uniform(-np.pi, np.pi, size)
+    command = np.column_stack([speed * np.cos(bearing), speed * np.sin(bearing), np.zeros(size)])
+    walked = walk(ActorFollower(spec, size, actor), command, seconds)
     return float(np.median(np.linalg.norm((walked.speed - command)[:, :2], axis=-1)))
 
 
-def stand(spec: RobotSpec, actor: Actor) -> float:
+def stand(spec: RobotSpec, actor: Actor, size: int, seconds: float) -> float:
     """How far robots that are told nothing get, median [m]."""
-    return float(np.median(walk(ActorFollower(spec, 32, actor), np.zeros((32, 3)), STANDS_S).moved))
+    return float(np.median(walk(ActorFollower(spec, size, actor), np.zeros((size, len(WAYS))), seconds).moved))
 
 
-def stressed(spec: RobotSpec, actor: Actor, limits: Box) -> float:
+def stressed(spec: RobotSpec, actor: Actor, limits: Box, size: int, seconds: float) -> float:
     """Share that falls under pushes and commands that change."""
-    batch, rng = ActorFollower(spec, COMMANDS, actor), np.random.default_rng(1)
+    batch, rng = ActorFollower(spec, size, actor), np.random.default_rng(1)
     every = round(PUSH_EVERY_S / batch.step_s)
 
     def disturb(step: int, command: np.ndarray) -> None:
@@ -99,4 +95,4 @@ def stressed(spec: RobotSpec, actor: Actor, limits: Box) -> float:
             batch.push(rng.uniform(-PUSH, PUSH, (batch.size, 2)))
             command[:] = rng.uniform(limits.low, limits.high, command.shape)
 
-    return float(walk(batch, held_out(limits, COMMANDS), STRESSED_S, disturb).fell.mean())
+    return float(walk(batch, held_out(limits, size), seconds, disturb).fell.mean())

@@ -16,9 +16,9 @@ from rebody.ranges import Box
 from rebody.store import save_artifact
 from rebody.training.card import card
 from rebody.training.run import Run
-from rebody.training.walking import measure
 from rebody.training.walking.config import WalkingConfig
 from rebody.training.walking.follower import ActorFollower
+from rebody.training.walking.measure import PUSH, PUSH_EVERY_S, SLOW, measure, slow_error, stand, stressed
 from rebody.training.walking.scales import network_of
 
 UNITS = ("m/s", "m/s", "rad/s")
@@ -36,7 +36,7 @@ def save_walking(actor: Actor, spec: RobotSpec, config: WalkingConfig, run: Run)
         f"Walking policy of '{spec.name}': (what it feels, joystick command) -> joint targets. Trained on {steps:,} "
         f"control steps with {updates:,} updates."
     )
-    rows = _figures(actor, spec, limits) | {"lag": f"{ways.lag_s:.2f} s"}
+    rows = _figures(actor, spec, limits, config) | {"lag": f"{ways.lag_s:.2f} s"}
     text = card(f"Walking policy: {spec.name}", what, run, rows)
     weights = network_of(actor, joints)
     return save_artifact(run.out, kind=KIND, config=asdict(settings), weights=weights, card=text, log=run.log)
@@ -46,6 +46,7 @@ def _settings(
     spec: RobotSpec, joints: JointInterface, limits: Box, ways: WalkingMeasured, config: WalkingConfig, run: Run
 ) -> WalkingSettings:
     """All that whoever walks by it has to know."""
+    stiffness, damping = joints.gains_in(spec.model)
     return WalkingSettings(
         robot=spec.name,
         control_dt=spec.control_dt,
@@ -53,8 +54,8 @@ def _settings(
         joints=joints.names,
         rest=tuple(joints.rest.tolist()),
         action_scale=tuple(joints.scale.tolist()),
-        stiffness=tuple(joints.gains[0].tolist()),
-        damping=tuple(joints.gains[1].tolist()),
+        stiffness=tuple(stiffness),
+        damping=tuple(damping),
         low=_three(limits.low),
         high=_three(limits.high),
         dead=_three(0.0 if slowest == np.inf else slowest for slowest in ways.dead),
@@ -69,26 +70,24 @@ def _three(numbers: Iterable[float]) -> Three:
     return forward, sideways, turn
 
 
-def _figures(actor: Actor, spec: RobotSpec, limits: Box) -> dict[str, str]:
+def _figures(actor: Actor, spec: RobotSpec, limits: Box, config: WalkingConfig) -> dict[str, str]:
     """Rows of the card."""
-    batch = ActorFollower(spec, measure.COMMANDS, actor)
-    missed = measure.measure(batch, limits, measure.LASTS_S)
-    condition = f"{measure.COMMANDS} held-out commands, {measure.LASTS_S:g} s: median / p95 error"
+    size, seconds = config.final_held_out, config.final_s
+    missed = measure(ActorFollower(spec, size, actor), limits, seconds)
+    condition = f"{size} held-out commands, {seconds:g} s: median / p95 error"
     rows = {
         f"{way} in [{low:g}, {high:g}] {unit}, {condition}": (
             f"{missed[f'{way} median']:.3f} / {missed[f'{way} p95']:.3f} {unit}"
         )
         for way, unit, low, high in zip(WAYS, UNITS, limits.low, limits.high, strict=True)
     }
-    slowest, fastest = measure.SLOW
-    stress = (
-        f"pushes to {measure.PUSH:g} m/s and new commands every {measure.PUSH_EVERY_S:g} s, {measure.STRESSED_S:g} s"
-    )
+    slow, stood = (of(spec, actor, size, seconds) for of in (slow_error, stand))
+    fell = stressed(spec, actor, limits, size, 2 * seconds)
     return rows | {
         "fell": f"{100 * missed['fell']:.1f} %",
-        f"slow commands, {slowest:g} to {fastest:g} m/s in any direction: median error": (
-            f"{measure.slow_error(spec, actor):.3f} m/s"
+        f"slow commands, {SLOW[0]:g} to {SLOW[1]:g} m/s in any direction: median error": f"{slow:.3f} m/s",
+        f"no command: distance after {seconds:g} s, median": f"{stood:.3f} m",
+        f"fell under pushes to {PUSH:g} m/s and new commands every {PUSH_EVERY_S:g} s, {2 * seconds:g} s": (
+            f"{100 * fell:.1f} %"
         ),
-        f"no command: distance after {measure.STANDS_S:g} s, median": f"{measure.stand(spec, actor):.3f} m",
-        f"fell under {stress}": f"{100 * measure.stressed(spec, actor, limits):.1f} %",
     }

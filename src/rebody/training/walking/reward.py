@@ -27,8 +27,8 @@ class WalkingReward:
 
     relative: NotNegative = 0.6
     """Paid in full at the wanted speed, less by the error relative to it: what makes a robot set out."""
-    slowest: Positive = 0.4
-    """Least speed that errors are relative to [m/s]."""
+    slowest: Positive = 0.2
+    """Least speed that errors are relative to [m/s]: larger, slow commands are left to standing still."""
     speed: NotNegative = 0.4
     """Paid in full at the wanted speed, less by a Gaussian of the error: what makes it precise."""
     speed_width: Positive = 0.17
@@ -37,8 +37,10 @@ class WalkingReward:
     """Paid in full at the wanted turn, less by a Gaussian of the error."""
     turn_width: Positive = 0.27
     """Standard deviation of that Gaussian [rad/s]."""
-    turn_error: NotNegative = 0.08
-    """Per rad/s from the wanted turn: what pulls from far away."""
+    relative_turn: NotNegative = 0.4
+    """Paid in full at the wanted turn, less by the error relative to it: without it none turns on the spot."""
+    slowest_turn: Positive = 0.3
+    """Least turn that errors are relative to [rad/s]."""
     tilt: NotNegative = 1.0
     """Times the tilt."""
     change: NotNegative = 0.15
@@ -67,13 +69,17 @@ def walking_reward(
     """Pay for one control step under a joystick command [m/s, m/s, rad/s]."""
     error = stride.speed - command
     miss = jnp.sqrt(jnp.sum(error[..., :2] ** 2, axis=-1) + 1e-6)
-    wanted, turn = jnp.linalg.norm(command[..., :2], axis=-1), jnp.abs(error[..., 2])
+    wanted, turn, wanted_turn = (
+        jnp.linalg.norm(command[..., :2], axis=-1),
+        jnp.abs(error[..., 2]),
+        jnp.abs(command[..., 2]),
+    )
     is_none = jnp.linalg.norm(command, axis=-1) < NO_COMMAND
     follows = (
         weights.relative * jnp.maximum(1 - miss / jnp.maximum(wanted, weights.slowest), -0.5)
         + weights.speed * jnp.exp(-0.5 * (miss / weights.speed_width) ** 2)
         + weights.turn * jnp.exp(-0.5 * (turn / weights.turn_width) ** 2)
-        - weights.turn_error * turn
+        + weights.relative_turn * jnp.maximum(1 - turn / jnp.maximum(wanted_turn, weights.slowest_turn), -0.5)
     )
     posture = weights.tilt * stride.tilt + weights.crouch * jnp.maximum(1 - weights.crouch_free - stride.height, 0.0)
     effort = weights.effort * jnp.mean(action**2, axis=-1) + weights.change * jnp.mean(

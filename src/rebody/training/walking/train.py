@@ -12,11 +12,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, PRNGKeyArray
+from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
 from rebody.bodies import RobotBatch
 from rebody.bodies.attitude import in_heading, wrap_angle
 from rebody.bodies.walking.batch import JointBatch, joint_interface
+from rebody.bodies.walking.joints import JointInterface
 from rebody.control.command import YAW
 from rebody.control.sac import Actor, SACBatch, SACState
 from rebody.jax_settings import own_jax_settings
@@ -156,7 +157,7 @@ class Relabelling(eqx.Module):
     config: WalkingConfig
     limits: Box
     scales: Float[np.ndarray, " number"]
-    columns: Float[np.ndarray, " 3"]  # of an observation, where the command is
+    columns: Int[np.ndarray, " 3"]  # of an observation, where the command is
     mirror: Mirror | None
 
     def __call__(self, steps: ControlSteps, key: PRNGKeyArray) -> SACBatch:
@@ -234,7 +235,7 @@ def begin_anew(world: World, batch: JointBatch, who: Bool[np.ndarray, " robot"],
     world.speed[who] = 0.0
 
 
-def command_columns(joints) -> np.ndarray:
+def command_columns(joints: JointInterface) -> Int[np.ndarray, " 3"]:
     """Where the command stands in what a policy hears."""
     ends = np.cumsum([joints.size(term) for term in joints.inputs])
     return np.arange(3) + ends[joints.inputs.index("command")] - 3
