@@ -71,6 +71,7 @@ class _Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     phase: _Phase | None = None
     stiffness: tuple[float, ...] = ()
     damping: tuple[float, ...] = ()
+    feet: tuple[str, ...] = ()
     mirror: tuple[str, ...] = ()
 
 

@@ -12,8 +12,8 @@ WEIGHTS = WalkingReward()
 LIMITS = Box((-1.0, -0.5, -1.2), (1.5, 0.5, 1.2))
 
 
-def paid(command, speed, *, tilt=0.0, height=1.0, stir=0.0, fell=False, action=0.0, last_action=0.0):
-    number = [np.array([each], np.float32) for each in (tilt, height, stir)]
+def paid(command, speed, *, tilt=0.0, height=1.0, stir=0.0, drag=0.0, fell=False, action=0.0, last_action=0.0):
+    number = [np.array([each], np.float32) for each in (tilt, height, stir, drag)]
     stride = Stride(np.array([speed], np.float32), *number, np.array([fell]))
     actions = [np.full((1, 2), each, np.float32) for each in (action, last_action)]
     return float(walking_reward(np.array([command], np.float32), stride, *actions, WEIGHTS)[0])
@@ -41,6 +41,7 @@ def test_posture_effort_and_falls_have_their_prices():
     assert best - paid(command, command, tilt=0.2) == pytest.approx(0.2 * WEIGHTS.tilt, rel=1e-4)
     assert best - paid(command, command, height=0.5) == pytest.approx(0.35 * WEIGHTS.crouch, rel=1e-4)
     assert best - paid(command, command, height=0.9) == pytest.approx(0.0, abs=1e-6)
+    assert best - paid(command, command, drag=0.4) == pytest.approx(0.4 * WEIGHTS.drag, rel=1e-4)
     held, changed = (paid(command, command, action=0.5, last_action=last) for last in (0.5, 0.0))
     assert held - changed == pytest.approx(0.25 * WEIGHTS.change, rel=1e-4)
 

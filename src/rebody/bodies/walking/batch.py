@@ -10,7 +10,7 @@ from rebody.bodies.robot import RobotSpec
 from rebody.bodies.walking.joints import Gait, JointInterface
 from rebody.bodies.walking.joystick import WAYS, navigator_sees
 from rebody.bodies.walking.policy import WalkingPolicy
-from rebody.errors import RebodyError
+from rebody.errors import RebodyError, did_you_mean
 
 
 class GaitBatch(RobotBatch):
@@ -59,6 +59,7 @@ class JointBatch(GaitBatch):
         """RebodyError for a robot whose description says nothing of a policy."""
         super().__init__(spec, size, threads, joint_interface(spec))
         self.actions = len(self.joints.names)
+        self._feet, self._geoms = feet_of(spec), self._batch.bind("geom_xpos")
 
     def step(self, actions):
         """Joint targets, for a control step."""
@@ -69,6 +70,12 @@ class JointBatch(GaitBatch):
     def joint_velocities(self) -> Float[np.ndarray, "robot joint"]:
         """In the order of the actions [rad/s]."""
         return self.qvel[:, self.joints.moves]
+
+    @property
+    def feet(self) -> Float[np.ndarray, "robot foot 3"]:
+        """A copy of where the lowest points of the feet are, and the centres over the ground [m]."""
+        centres = self._geoms.reshape(self.size, -1, 3)[:, self._feet]
+        return centres - [0.0, 0.0, 1.0] * self.model.geom_rbound[self._feet, None]
 
     def hear(self, command: Float[np.ndarray, "robot 3"]) -> Float[np.ndarray, "robot number"]:
         """What a policy would be shown of them under these commands [m/s, rad/s]."""
@@ -100,6 +107,16 @@ class WalkingBatch(GaitBatch):
 
     def _begin(self, robots: int) -> Gait:
         return self._policy.begin(robots)
+
+
+def feet_of(spec: RobotSpec) -> list[int]:
+    """Ids of the geoms that it stands on; RebodyError where the model has none of such a name."""
+    named, model = spec.walking.feet if spec.walking else (), spec.model
+    geoms = {model.geom(i).name: i for i in range(model.ngeom)}
+    if missing := [name for name in named if name not in geoms]:
+        near = did_you_mean(missing[0], geoms)
+        raise RebodyError(f"robot '{spec.name}': [policy] feet names '{missing[0]}', which is no geom.{near or ''}")
+    return [geoms[name] for name in named]
 
 
 def joint_interface(spec: RobotSpec) -> JointInterface:

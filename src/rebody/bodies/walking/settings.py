@@ -79,6 +79,8 @@ class Walking:
     """PD gains of each joint where the model has motors [N m/rad]; none for the model's own actuators."""
     damping: tuple[float, ...] = ()
     """[N m s/rad]"""
+    feet: tuple[str, ...] = ()
+    """Geoms that it stands on: a policy that is learned here lifts them instead of dragging them."""
     mirror: tuple[str, ...] = ()
     """Where left and right are alike: for each joint the one whose place it takes in a mirror, behind a minus where it
     turns the other way. A policy that is learned here then learns both sides at once."""

@@ -18,6 +18,7 @@ class Stride(eqx.Module):
     tilt: Float[AnyArray, "*batch"]  # 1 - cos of the angle between the root's up and the world's
     height: Float[AnyArray, "*batch"]  # of the root, as a share of that in the rest pose
     stir: Float[AnyArray, "*batch"]  # mean squared joint velocity [rad^2/s^2]
+    drag: Float[AnyArray, "*batch"]  # mean speed of the feet over the ground, less the higher they are [m/s]
     fell: Bool[AnyArray, "*batch"]
 
 
@@ -53,6 +54,8 @@ class WalkingReward:
     """Share of the height that may be missing."""
     stir: NotNegative = 0.03
     """Times the mean squared joint velocity while none is commanded: who is told nothing stands still."""
+    drag: NotNegative = 0.5
+    """Per m/s of feet that slide: who moves a foot lifts it."""
     alive: NotNegative = 0.2
     """Paid as long as it has not fallen."""
     fall: NotNegative = 1.0
@@ -86,4 +89,4 @@ def walking_reward(
         (action - last_action) ** 2, axis=-1
     )
     stir = weights.stir * is_none * jnp.minimum(stride.stir, 20.0)
-    return follows - posture - effort - stir + weights.alive - weights.fall * stride.fell
+    return follows - posture - effort - stir - weights.drag * stride.drag + weights.alive - weights.fall * stride.fell

@@ -33,6 +33,10 @@ from rebody.training.walking.reward import Stride, walking_reward
 from rebody.training.walking.scales import input_scales, loaded_actor
 from rebody.types import POSE_FIELDS, AnyArray
 
+CLEARANCE = 0.05
+"""Height from which on a foot may move as it likes [m]."""
+FASTEST_FOOT = 2.0
+"""Nothing is paid for what is faster [m/s]: feet of robots that have just been reset seem to jump."""
 HEIGHT, ROLL, PITCH = (POSE_FIELDS.index(name) for name in ("z", "roll", "pitch"))
 
 
@@ -102,7 +106,9 @@ class WalkingLearner(Learner[World]):
         hears, joints = self.sizes(batch)
         seen, action, way = (np.zeros((1, size), np.float32) for size in (hears, joints, 3))
         scalar = np.zeros(1, np.float32)
-        return ControlSteps(seen, action, action, seen, Stride(way, scalar, scalar, scalar, np.zeros(1, bool)), way)
+        return ControlSteps(
+            seen, action, action, seen, Stride(way, scalar, scalar, scalar, scalar, np.zeros(1, bool)), way
+        )
 
     def begin(self, batch: RobotBatch, actor: Actor, key: PRNGKeyArray) -> World:
         """Robots without commands."""
@@ -119,7 +125,7 @@ class WalkingLearner(Learner[World]):
             command_key, action_key = jax.random.split(jax.random.fold_in(key, step))
             renew(world, self, rng, command_key)
             push(batch, config, rng)
-            seen, last_action, before = batch.hear(world.command), batch.gait.last_action, batch.pose()
+            seen, last_action, before = batch.hear(world.command), batch.gait.last_action, (batch.pose(), batch.feet)
             action = np.asarray(explore(state.sac.actor, seen * scales, action_key))
             batch.step(action)
             stride, command = stride_of(batch, before, world.speed, config), world.command.copy()
@@ -192,10 +198,15 @@ def experience(seen: ControlSteps, config: WalkingConfig, control_dt: float) -> 
 
 
 def stride_of(
-    batch: JointBatch, before: Float[np.ndarray, "robot 6"], mean: Float[np.ndarray, "robot 3"], config: WalkingConfig
+    batch: JointBatch,
+    begun: tuple[Float[np.ndarray, "robot 6"], Float[np.ndarray, "robot foot 3"]],
+    mean: Float[np.ndarray, "robot 3"],
+    config: WalkingConfig,
 ) -> Stride:
-    """What the control step did that began in the poses `before`; the running mean of the speeds moves on, in place."""
-    pose, dt = batch.pose(), batch.step_s
+    """What the control step did that began in these poses, with the feet there; the running mean of the speeds moves
+    on, in place.
+    """
+    (before, feet), pose, dt = begun, batch.pose(), batch.step_s
     moved = in_heading(pose[:, :2] - before[:, :2], before[:, YAW])
     speed = np.column_stack([moved, wrap_angle(pose[:, YAW] - before[:, YAW])]) / dt
     mean += min(1.0, dt / max(config.smoothing_s, dt)) * (speed - mean)
@@ -204,8 +215,20 @@ def stride_of(
         1 - np.cos(pose[:, ROLL]) * np.cos(pose[:, PITCH]),
         1 + pose[:, HEIGHT] / batch.spec.torso_height,
         np.mean(batch.joint_velocities**2, axis=-1),
+        drag(feet, batch.feet, dt),
     )
     return Stride(*(each.astype(np.float32) for each in numbers), fell=batch.fallen)
+
+
+def drag(
+    before: Float[np.ndarray, "robot foot 3"], now: Float[np.ndarray, "robot foot 3"], dt: float
+) -> Float[np.ndarray, " robot"]:
+    """How fast feet move over the ground, on average; in full on it, not at all from `CLEARANCE` on [m/s]."""
+    if now.shape[1] == 0:
+        return np.zeros(len(now))
+    speed = np.linalg.norm(now[..., :2] - before[..., :2], axis=-1) / dt
+    low = np.clip(1 - 0.5 * (before[..., 2] + now[..., 2]) / CLEARANCE, 0.0, 1.0)
+    return np.minimum(low * speed, FASTEST_FOOT).mean(axis=-1)
 
 
 def renew(world: World, learner: WalkingLearner, rng: np.random.Generator, key: PRNGKeyArray) -> None:
