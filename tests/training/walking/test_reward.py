@@ -6,7 +6,8 @@ import pytest
 
 from rebody.ranges import Box
 from rebody.training.walking.commands import SLOW, CommandDistribution
-from rebody.training.walking.reward import Stride, WalkingReward, walking_reward
+from rebody.training.walking.reward import WalkingReward, walking_reward
+from rebody.training.walking.stride import CLEARANCE, FASTEST_FOOT, Stride, drag
 
 WEIGHTS = WalkingReward()
 LIMITS = Box((-1.0, -0.5, -1.2), (1.5, 0.5, 1.2))
@@ -65,3 +66,12 @@ def test_commands_are_within_limits_and_of_every_kind():
     assert (share[~is_still] < SLOW).mean() > 0.3
     only_turns = ~drawn[:, :2].any(axis=1) & (drawn[:, 2] != 0)
     assert only_turns.mean() == pytest.approx(0.8 * 0.2 * 0.5 * 0.6, abs=0.02)
+
+
+def test_low_feet_drag_and_high_ones_do_not():
+    before = np.zeros((1, 4, 3))
+    now = before + np.array([[[0.02, 0.0, 0.0], [0.0, 0.02, 2.0 * CLEARANCE], [0.0, 0.0, 0.0], [9.0, 0.0, 0.0]]])
+    now[0, 0, 2] = CLEARANCE
+    expected = 0.25 * (0.5 * 1.0 + 0.0 + 0.0 + FASTEST_FOOT)
+    np.testing.assert_allclose(drag(before, now, 0.02), expected)
+    np.testing.assert_array_equal(drag(before[:, :0], now[:, :0], 0.02), 0.0)

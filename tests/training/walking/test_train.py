@@ -18,6 +18,8 @@ from rebody.training.run import Interrupted
 from rebody.training.walking import WalkingConfig, train, train_walking
 from rebody.training.walking.commands import CommandDistribution
 from rebody.training.walking.follower import ActorFollower
+from rebody.training.walking.relabelling import Relabelling, command_columns
+from rebody.training.walking.reward import walking_reward
 from rebody.training.walking.scales import input_scales, loaded_actor
 
 
@@ -36,7 +38,7 @@ def test_rows_of_the_buffer_belong_together(cart, config):
     config = replace(config, push=0.0, commands=CommandDistribution(zero_share=0.0))
     learner, batch, state = collected(cart, config, 2)
     rows, size = state.replay.rows, 2 * config.steps * config.robots
-    columns = train.command_columns(batch.joints)
+    columns = command_columns(batch.joints)
     felt = np.setdiff1d(np.arange(learner.sizes(batch)[0]), columns)
     after = slice(config.robots, size)
     np.testing.assert_array_equal(rows.next_seen[: size - config.robots, felt], rows.seen[after][:, felt])
@@ -48,15 +50,15 @@ def test_rows_of_the_buffer_belong_together(cart, config):
 def test_half_of_a_batch_learns_under_its_own_command(cart, config):
     learner, batch, state = collected(cart, config, 2)
     rows = jax.tree.map(lambda leaf: leaf[:40], state.replay.rows)
-    columns, scales = train.command_columns(batch.joints), input_scales(batch.joints)
-    told = train.Relabelling(config, learner.limits, scales, columns, None)(rows, jax.random.key(0))
+    columns, scales = command_columns(batch.joints), input_scales(batch.joints)
+    told = Relabelling(config, learner.limits, scales, columns, None)(rows, jax.random.key(0))
     command = np.asarray(told.observation)[:, columns]
     np.testing.assert_allclose(command[20:], rows.command[20:], rtol=1e-6)
     assert np.abs(command[:20] - rows.command[:20]).max() > 0.1
     np.testing.assert_array_equal(command, np.asarray(told.next_observation)[:, columns])
     rest = np.setdiff1d(np.arange(len(scales)), columns)
     np.testing.assert_allclose(np.asarray(told.observation)[:, rest], (rows.seen * scales)[:, rest], rtol=1e-6)
-    reward = train.walking_reward(command, rows.stride, rows.action, rows.last_action, config.reward)
+    reward = walking_reward(command, rows.stride, rows.action, rows.last_action, config.reward)
     np.testing.assert_allclose(told.reward, reward, rtol=1e-5)
 
 

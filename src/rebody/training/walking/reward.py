@@ -2,24 +2,13 @@
 
 from dataclasses import dataclass
 
-import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from rebody.bodies.walking.joints import NO_COMMAND
 from rebody.ranges import NotNegative, Positive, Share
+from rebody.training.walking.stride import Stride
 from rebody.types import AnyArray
-
-
-class Stride(eqx.Module):
-    """How a robot moved in a control step."""
-
-    speed: Float[AnyArray, "*batch 3"]  # half of the step's, half of a running mean's [m/s, m/s, rad/s]
-    tilt: Float[AnyArray, "*batch"]  # 1 - cos of the angle between the root's up and the world's
-    height: Float[AnyArray, "*batch"]  # of the root, as a share of that in the rest pose
-    stir: Float[AnyArray, "*batch"]  # mean squared joint velocity [rad^2/s^2]
-    drag: Float[AnyArray, "*batch"]  # mean speed of the feet over the ground, less the higher they are [m/s]
-    fell: Bool[AnyArray, "*batch"]
 
 
 @dataclass(frozen=True)

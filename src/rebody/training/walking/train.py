@@ -10,16 +10,12 @@ from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int, PRNGKeyArray
+from jaxtyping import Bool, Float, PRNGKeyArray
 
 from rebody.bodies import RobotBatch
-from rebody.bodies.attitude import in_heading, wrap_angle
 from rebody.bodies.walking.batch import JointBatch, joint_interface
-from rebody.bodies.walking.joints import JointInterface
-from rebody.control.command import YAW
-from rebody.control.sac import Actor, SACBatch, SACState
+from rebody.control.sac import Actor, SACState
 from rebody.jax_settings import own_jax_settings
 from rebody.ranges import Box
 from rebody.training.off_policy import Learner, OffPolicyState, explore, learn, ready_robot, train
@@ -27,17 +23,11 @@ from rebody.training.run import Run
 from rebody.training.walking.config import WalkingConfig
 from rebody.training.walking.follower import ActorFollower
 from rebody.training.walking.measure import measure
-from rebody.training.walking.mirror import Mirror, mirror_of
+from rebody.training.walking.mirror import mirror_of
+from rebody.training.walking.relabelling import ControlSteps, Relabelling, command_columns, experience
 from rebody.training.walking.report import save_walking
-from rebody.training.walking.reward import Stride, walking_reward
 from rebody.training.walking.scales import input_scales, loaded_actor
-from rebody.types import POSE_FIELDS, AnyArray
-
-CLEARANCE = 0.05
-"""Height from which on a foot may move as it likes [m]."""
-FASTEST_FOOT = 2.0
-"""Nothing is paid for what is faster [m/s]: feet of robots that have just been reset seem to jump."""
-HEIGHT, ROLL, PITCH = (POSE_FIELDS.index(name) for name in ("z", "roll", "pitch"))
+from rebody.training.walking.stride import Stride, stride_of
 
 
 @own_jax_settings()
@@ -59,17 +49,6 @@ def train_walking(
     spec = ready_robot(robot, config)
     learner = WalkingLearner(spec, config)
     return train(learner, out, {"robot": robot, "seed": seed}, resume=resume, finish=finish, init_from=init_from)
-
-
-class ControlSteps(eqx.Module):
-    """Transitions as the replay buffer holds them: the reward follows from the command, which may be another."""
-
-    seen: Float[AnyArray, "*size number"]
-    action: Float[AnyArray, "*size joint"]
-    last_action: Float[AnyArray, "*size joint"]
-    next_seen: Float[AnyArray, "*size number"]
-    stride: Stride
-    command: Float[AnyArray, "*size 3"]
 
 
 class World(eqx.Module):
@@ -128,7 +107,7 @@ class WalkingLearner(Learner[World]):
             seen, last_action, before = batch.hear(world.command), batch.gait.last_action, (batch.pose(), batch.feet)
             action = np.asarray(explore(state.sac.actor, seen * scales, action_key))
             batch.step(action)
-            stride, command = stride_of(batch, before, world.speed, config), world.command.copy()
+            stride, command = stride_of(batch, before, world.speed, config.smoothing_s), world.command.copy()
             state.replay.append(ControlSteps(seen, action, last_action, batch.hear(command), stride, command))
             begin_anew(world, batch, batch.fallen, rng)
         newest = state.replay.newest(config.steps * config.robots)
@@ -153,82 +132,6 @@ class WalkingLearner(Learner[World]):
     def load_actor(self, artifact: str) -> Actor:
         """That of a walking policy."""
         return loaded_actor(artifact, joint_interface(self.spec), self.config.sac)
-
-
-class Relabelling(eqx.Module):
-    """Transitions with their own command or a new one, and the reward that it would have brought, as they were or in a
-    mirror.
-    """
-
-    config: WalkingConfig
-    limits: Box
-    scales: Float[np.ndarray, " number"]
-    columns: Int[np.ndarray, " 3"]  # of an observation, where the command is
-    mirror: Mirror | None
-
-    def __call__(self, steps: ControlSteps, key: PRNGKeyArray) -> SACBatch:
-        """A batch to learn from."""
-        fresh_key, mirror_key = jax.random.split(key)
-        size = len(steps.stride.fell)
-        fresh = self.config.commands.sample(fresh_key, size, self.limits)
-        renewed = (jnp.arange(size) < self.config.relabelled * size)[:, None]
-        command = jnp.where(renewed, fresh, steps.command)
-        seen, next_seen = (jnp.asarray(each).at[:, self.columns].set(command) for each in (steps.seen, steps.next_seen))
-        action = steps.action
-        reward = walking_reward(command, steps.stride, action, steps.last_action, self.config.reward)
-        if self.mirror is not None:  # the reward is the same
-            turned = jax.random.bernoulli(mirror_key, shape=(size, 1))
-            seen, next_seen = (jnp.where(turned, self.mirror.seen(each), each) for each in (seen, next_seen))
-            action = jnp.where(turned, self.mirror.done(action), action)
-        return SACBatch(
-            observation=seen * self.scales,
-            action=action,
-            reward=reward,
-            next_observation=next_seen * self.scales,
-            terminal=steps.stride.fell.astype(jnp.float32),
-        )
-
-
-@eqx.filter_jit
-def experience(seen: ControlSteps, config: WalkingConfig, control_dt: float) -> dict[str, Float[AnyArray, ""]]:
-    """What was earned per control step, and how often robots fell."""
-    reward = walking_reward(seen.command, seen.stride, seen.action, seen.last_action, config.reward)
-    fell = seen.stride.fell
-    return {"reward": reward.mean(), "falls_per_minute": 60 * fell.sum() / (fell.size * control_dt)}
-
-
-def stride_of(
-    batch: JointBatch,
-    begun: tuple[Float[np.ndarray, "robot 6"], Float[np.ndarray, "robot foot 3"]],
-    mean: Float[np.ndarray, "robot 3"],
-    config: WalkingConfig,
-) -> Stride:
-    """What the control step did that began in these poses, with the feet there; the running mean of the speeds moves
-    on, in place.
-    """
-    (before, feet), pose, dt = begun, batch.pose(), batch.step_s
-    moved = in_heading(pose[:, :2] - before[:, :2], before[:, YAW])
-    speed = np.column_stack([moved, wrap_angle(pose[:, YAW] - before[:, YAW])]) / dt
-    mean += min(1.0, dt / max(config.smoothing_s, dt)) * (speed - mean)
-    numbers = (
-        0.5 * (speed + mean),
-        1 - np.cos(pose[:, ROLL]) * np.cos(pose[:, PITCH]),
-        1 + pose[:, HEIGHT] / batch.spec.torso_height,
-        np.mean(batch.joint_velocities**2, axis=-1),
-        drag(feet, batch.feet, dt),
-    )
-    return Stride(*(each.astype(np.float32) for each in numbers), fell=batch.fallen)
-
-
-def drag(
-    before: Float[np.ndarray, "robot foot 3"], now: Float[np.ndarray, "robot foot 3"], dt: float
-) -> Float[np.ndarray, " robot"]:
-    """How fast feet move over the ground, on average; in full on it, not at all from `CLEARANCE` on [m/s]."""
-    if now.shape[1] == 0:
-        return np.zeros(len(now))
-    speed = np.linalg.norm(now[..., :2] - before[..., :2], axis=-1) / dt
-    low = np.clip(1 - 0.5 * (before[..., 2] + now[..., 2]) / CLEARANCE, 0.0, 1.0)
-    return np.minimum(low * speed, FASTEST_FOOT).mean(axis=-1)
 
 
 def renew(world: World, learner: WalkingLearner, rng: np.random.Generator, key: PRNGKeyArray) -> None:
@@ -256,12 +159,6 @@ def begin_anew(world: World, batch: JointBatch, who: Bool[np.ndarray, " robot"],
     batch.reset(rng, who)
     world.steps_left[who] = 0
     world.speed[who] = 0.0
-
-
-def command_columns(joints: JointInterface) -> Int[np.ndarray, " 3"]:
-    """Where the command stands in what a policy hears."""
-    ends = np.cumsum([joints.size(term) for term in joints.inputs])
-    return np.arange(3) + ends[joints.inputs.index("command")] - 3
 
 
 @eqx.filter_jit
