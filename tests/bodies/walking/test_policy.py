@@ -9,6 +9,7 @@ import pytest
 from tests.walking import CART, write_linear
 
 from rebody.bodies.walking import Joystick, Walking
+from rebody.bodies.walking.joints import JointInterface
 from rebody.bodies.walking.policy import WalkingPolicy
 from rebody.bodies.walking.settings import Phase
 from rebody.errors import RebodyError
@@ -130,6 +131,26 @@ def test_what_mjlab_writes_is_read_from_the_file(moving, tmp_path):
     policy.joints.drive(model)
     np.testing.assert_array_equal(model.actuator_gainprm[:, 0], [30.0, 20.0])
     np.testing.assert_array_equal(model.actuator_biasprm[:, :3], [[0.0, -30.0, -2.0], [0.0, -20.0, -1.0]])
+
+
+def test_motors_become_servos_as_strong_as_they_were(tmp_path):
+    arm = """
+    <mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1"/>
+      <body name="arm"><joint name="elbow" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/></body>
+    </body></worldbody><actuator>
+      <motor joint="elbow" gear="150" ctrlrange="-0.5 1"/>
+    </actuator></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(arm)
+    walking = Walking(None, STICK, inputs=("command",), stiffness=(40.0,), damping=(2.0,))
+    joints = JointInterface("arm", walking, model, model.qpos0, 1, {})
+    assert joints.gains_in(model) == ([], [])
+    joints.drive(model)
+    assert joints.gains_in(model) == ([40.0], [2.0])
+    data = mujoco.MjData(model)
+    for target, speed, expected in ((1.0, 0.0, 40.0), (1.0, 5.0, 30.0), (9.0, 0.0, 150.0), (-9.0, 0.0, -75.0)):
+        data.ctrl[:], data.qvel[6] = target, speed
+        mujoco.mj_forward(model, data)
+        np.testing.assert_allclose(data.qfrc_actuator[6], expected)
 
 
 @pytest.mark.parametrize(

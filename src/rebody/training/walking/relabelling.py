@@ -37,6 +37,7 @@ class Relabelling(eqx.Module):
     scales: Float[np.ndarray, " number"]
     columns: Int[np.ndarray, " 3"]  # of an observation, where the command is
     mirror: Mirror | None
+    drag_share: float | Float[AnyArray, ""] = 1.0  # of the price of dragging
 
     def __call__(self, steps: ControlSteps, key: PRNGKeyArray) -> SACBatch:
         """A batch to learn from."""
@@ -47,7 +48,7 @@ class Relabelling(eqx.Module):
         command = jnp.where(renewed, fresh, steps.command)
         seen, next_seen = (jnp.asarray(each).at[:, self.columns].set(command) for each in (steps.seen, steps.next_seen))
         action = steps.action
-        reward = walking_reward(command, steps.stride, action, steps.last_action, self.config.reward)
+        reward = walking_reward(command, steps.stride, action, steps.last_action, self.config.reward, self.drag_share)
         if self.mirror is not None:  # the reward is the same
             turned = jax.random.bernoulli(mirror_key, shape=(size, 1))
             seen, next_seen = (jnp.where(turned, self.mirror.seen(each), each) for each in (seen, next_seen))

@@ -43,7 +43,7 @@ class WalkingReward:
     """Share of the height that may be missing."""
     stir: NotNegative = 0.03
     """Times the mean squared joint velocity while none is commanded: who is told nothing stands still."""
-    drag: NotNegative = 0.5
+    drag: NotNegative = 0.4
     """Per m/s of feet that slide: who moves a foot lifts it."""
     alive: NotNegative = 0.2
     """Paid as long as it has not fallen."""
@@ -57,8 +57,9 @@ def walking_reward(
     action: Float[AnyArray, "*batch joint"],
     last_action: Float[AnyArray, "*batch joint"],
     weights: WalkingReward,
+    drag_share: float | Float[AnyArray, ""] = 1.0,
 ) -> Float[AnyArray, "*batch"]:
-    """Pay for one control step under a joystick command [m/s, m/s, rad/s]."""
+    """Pay for one control step under a joystick command [m/s, m/s, rad/s]; `drag_share` of the price of dragging."""
     error = stride.speed - command
     miss = jnp.sqrt(jnp.sum(error[..., :2] ** 2, axis=-1) + 1e-6)
     wanted, turn, wanted_turn = (
@@ -78,4 +79,12 @@ def walking_reward(
         (action - last_action) ** 2, axis=-1
     )
     stir = weights.stir * is_none * jnp.minimum(stride.stir, 20.0)
-    return follows - posture - effort - stir - weights.drag * stride.drag + weights.alive - weights.fall * stride.fell
+    return (
+        follows
+        - posture
+        - effort
+        - stir
+        - drag_share * weights.drag * stride.drag
+        + weights.alive
+        - weights.fall * stride.fell
+    )

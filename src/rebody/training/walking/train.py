@@ -10,6 +10,7 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, PRNGKeyArray
 
@@ -118,7 +119,9 @@ class WalkingLearner(Learner[World]):
         assert self.spec.walking is not None
         joints = joint_interface(self.spec)
         mirror = mirror_of(joints, self.spec.walking.mirror, self.spec.name)
-        told = Relabelling(self.config, self.limits, input_scales(joints), command_columns(joints), mirror)
+        grown = min(1.0, iteration / max(1, self.config.drag_iterations))
+        share = jnp.asarray(grown)  # a number would be compiled anew whenever it changes
+        told = Relabelling(self.config, self.limits, input_scales(joints), command_columns(joints), mirror, share)
         return learn(policy, drawn, key, self.config.sac, told)
 
     def measure(self, actor: Actor) -> dict[str, float]:
