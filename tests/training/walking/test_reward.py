@@ -54,18 +54,18 @@ def test_only_who_is_told_nothing_pays_for_moving_its_joints():
 
 
 def test_commands_are_within_limits_and_of_every_kind():
-    commands = CommandDistribution(slow_share=0.3, zero_share=0.2)
+    commands = CommandDistribution(slow_share=0.3, zero_share=0.2, spin_share=0.25)
     drawn = np.asarray(commands.sample(jax.random.key(0), 20_000, LIMITS))
     assert (drawn >= LIMITS.low).all()
     assert (drawn <= LIMITS.high).all()
     np.testing.assert_allclose(np.abs(drawn).max(axis=0), [1.5, 0.5, 1.2], atol=0.05)
     is_still = ~drawn.any(axis=1)
     none_of_three = 0.2 * 0.5 * 0.4
-    assert is_still.mean() == pytest.approx(0.2 + 0.8 * none_of_three, abs=0.02)
+    assert is_still.mean() == pytest.approx(0.2 + 0.8 * 0.75 * none_of_three, abs=0.02)
     share = np.abs(drawn / np.where(drawn > 0, LIMITS.high, LIMITS.low)).max(axis=1)
     assert (share[~is_still] < SLOW).mean() > 0.3
     only_turns = ~drawn[:, :2].any(axis=1) & (drawn[:, 2] != 0)
-    assert only_turns.mean() == pytest.approx(0.8 * 0.2 * 0.5 * 0.6, abs=0.02)
+    assert only_turns.mean() == pytest.approx(0.8 * (0.25 + 0.75 * 0.2 * 0.5 * 0.6), abs=0.02)
 
 
 def test_low_feet_drag_and_high_ones_do_not():

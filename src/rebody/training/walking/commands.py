@@ -19,6 +19,8 @@ class CommandDistribution:
 
     ways: tuple[Share, Share, Share] = (0.8, 0.5, 0.6)
     """How often a command goes forward or back, sideways, and turns."""
+    spin_share: Share = 0.15
+    """Share of commands that ask for a turn alone."""
     slow_share: Share = 0.2
     """Share of commands that are slow."""
     zero_share: Share = 0.1
@@ -26,9 +28,11 @@ class CommandDistribution:
 
     def sample(self, key: PRNGKeyArray, size: int, limits: Box) -> Float[AnyArray, "size 3"]:
         """So many, within these limits [m/s, m/s, rad/s]."""
-        value, way, slow, pace, still = jax.random.split(key, 5)
+        value, way, spin, slow, pace, still = jax.random.split(key, 6)
         drawn = jax.random.uniform(value, (size, 3), minval=jnp.asarray(limits.low), maxval=jnp.asarray(limits.high))
-        drawn = drawn * jax.random.bernoulli(way, jnp.asarray(self.ways), (size, 3))
+        is_spin = jax.random.bernoulli(spin, self.spin_share, (size, 1))
+        goes = jax.random.bernoulli(way, jnp.asarray(self.ways), (size, 3))
+        drawn = drawn * jnp.where(is_spin, jnp.array([False, False, True]), goes)
         share = jnp.where(
             jax.random.bernoulli(slow, self.slow_share, (size, 1)), SLOW * jax.random.uniform(pace, (size, 1)), 1.0
         )

@@ -11,6 +11,10 @@ from rebody.training.walking.stride import Stride
 from rebody.types import AnyArray
 
 
+MOST_STIR = 20.0
+"""No mean squared joint velocity beyond this costs more [rad^2/s^2]."""
+
+
 @dataclass(frozen=True)
 class WalkingReward:
     """Weights of what a walking policy is paid."""
@@ -27,10 +31,12 @@ class WalkingReward:
     """Paid in full at the wanted turn, less by a Gaussian of the error."""
     turn_width: Positive = 0.27
     """Standard deviation of that Gaussian [rad/s]."""
-    relative_turn: NotNegative = 0.4
+    relative_turn: NotNegative = 0.6
     """Paid in full at the wanted turn, less by the error relative to it: without it none turns on the spot."""
     slowest_turn: Positive = 0.3
     """Least turn that errors are relative to [rad/s]."""
+    wobble: NotNegative = 0.3
+    """Metres that count as a radian where one of the two is asked for: who turns on the spot may sway."""
     tilt: NotNegative = 1.0
     """Times the tilt."""
     change: NotNegative = 0.15
@@ -43,7 +49,7 @@ class WalkingReward:
     """Share of the height that may be missing."""
     stir: NotNegative = 0.03
     """Times the mean squared joint velocity while none is commanded: who is told nothing stands still."""
-    drag: NotNegative = 0.4
+    drag: NotNegative = 0.25
     """Per m/s of feet that slide: who moves a foot lifts it."""
     alive: NotNegative = 0.2
     """Paid as long as it has not fallen."""
@@ -60,31 +66,25 @@ def walking_reward(
     drag_share: float | Float[AnyArray, ""] = 1.0,
 ) -> Float[AnyArray, "*batch"]:
     """Pay for one control step under a joystick command [m/s, m/s, rad/s]; `drag_share` of the price of dragging."""
-    error = stride.speed - command
-    miss = jnp.sqrt(jnp.sum(error[..., :2] ** 2, axis=-1) + 1e-6)
-    wanted, turn, wanted_turn = (
-        jnp.linalg.norm(command[..., :2], axis=-1),
-        jnp.abs(error[..., 2]),
-        jnp.abs(command[..., 2]),
-    )
-    is_none = jnp.linalg.norm(command, axis=-1) < NO_COMMAND
+    error, is_none = stride.speed - command, jnp.linalg.norm(command, axis=-1) < NO_COMMAND
+    miss, turn = jnp.sqrt(jnp.sum(error[..., :2] ** 2, axis=-1) + 1e-6), jnp.abs(error[..., 2])
+    wanted, wanted_turn = jnp.linalg.norm(command[..., :2], axis=-1), jnp.abs(command[..., 2])
+    size = jnp.maximum(jnp.maximum(wanted, weights.slowest), weights.wobble * wanted_turn)
+    size_turn = jnp.maximum(jnp.maximum(wanted_turn, weights.slowest_turn), weights.wobble * wanted)
     follows = (
-        weights.relative * jnp.maximum(1 - miss / jnp.maximum(wanted, weights.slowest), -0.5)
+        weights.relative * jnp.maximum(1 - miss / size, -0.5)
         + weights.speed * jnp.exp(-0.5 * (miss / weights.speed_width) ** 2)
+        + weights.relative_turn * jnp.maximum(1 - turn / size_turn, -0.5)
         + weights.turn * jnp.exp(-0.5 * (turn / weights.turn_width) ** 2)
-        + weights.relative_turn * jnp.maximum(1 - turn / jnp.maximum(wanted_turn, weights.slowest_turn), -0.5)
     )
-    posture = weights.tilt * stride.tilt + weights.crouch * jnp.maximum(1 - weights.crouch_free - stride.height, 0.0)
-    effort = weights.effort * jnp.mean(action**2, axis=-1) + weights.change * jnp.mean(
-        (action - last_action) ** 2, axis=-1
+    missing = jnp.maximum(1 - weights.crouch_free - stride.height, 0.0)
+    price = (
+        weights.tilt * stride.tilt
+        + weights.crouch * missing
+        + weights.effort * jnp.mean(action**2, axis=-1)
+        + weights.change * jnp.mean((action - last_action) ** 2, axis=-1)
+        + weights.stir * is_none * jnp.minimum(stride.stir, MOST_STIR)
+        + drag_share * weights.drag * stride.drag
+        + weights.fall * stride.fell
     )
-    stir = weights.stir * is_none * jnp.minimum(stride.stir, 20.0)
-    return (
-        follows
-        - posture
-        - effort
-        - stir
-        - drag_share * weights.drag * stride.drag
-        + weights.alive
-        - weights.fall * stride.fell
-    )
+    return follows - price + weights.alive
