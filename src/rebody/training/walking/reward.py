@@ -10,7 +10,6 @@ from rebody.ranges import NotNegative, Positive, Share
 from rebody.training.walking.stride import Stride
 from rebody.types import AnyArray
 
-
 MOST_STIR = 20.0
 """No mean squared joint velocity beyond this costs more [rad^2/s^2]."""
 
