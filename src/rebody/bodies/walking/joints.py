@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from rebody.bodies.attitude import inverse, product
+from rebody.bodies.walking.servos import is_servo, serve
 from rebody.bodies.walking.settings import MJLAB, Term, Walking
 from rebody.errors import RebodyError, did_you_mean
 
@@ -70,14 +71,14 @@ class JointInterface:
         if not all(len(gains) for gains in self.gains):
             return
         for row, p, d in zip(self.actuators, *self.gains, strict=True):
-            _serve(model, int(row), p, d)
+            serve(model, int(row), p, d)
 
     def gains_in(self, model: mujoco.MjModel) -> tuple[list[float], list[float]]:
         """Stiffness [N m/rad] and damping [N m s/rad] of each joint's servo in a model; none where one has another
         actuator.
         """
         rows = self.actuators
-        if not all(_is_servo(model, int(row)) for row in rows):
+        if not all(is_servo(model, int(row)) for row in rows):
             return [], []
         return (-model.actuator_biasprm[rows, 1]).tolist(), (-model.actuator_biasprm[rows, 2]).tolist()
 
@@ -207,27 +208,6 @@ class JointInterface:
 
     def _misfit(self, why: str) -> RebodyError:
         return misfit(self._robot, self._walking, why)
-
-
-def _is_servo(model: mujoco.MjModel, row: int) -> bool:
-    """Whether an actuator pulls its joint towards the position that it is told [rad]."""
-    p = model.actuator_gainprm[row, 0]
-    return bool(p > 0 and model.actuator_biasprm[row, 1] == -p and model.actuator_gear[row, 0] == 1)
-
-
-def _serve(model: mujoco.MjModel, row: int, p: float, d: float) -> None:
-    """Make an actuator a servo of these gains, as strong as it was."""
-    if not _is_servo(model, row):  # its range is no range of positions
-        gear = model.actuator_gear[row, 0]
-        if model.actuator_biastype[row] == mujoco.mjtBias.mjBIAS_NONE and model.actuator_ctrllimited[row]:
-            strength = gear * model.actuator_gainprm[row, 0] * model.actuator_ctrlrange[row]
-            model.actuator_forcerange[row], model.actuator_forcelimited[row] = np.sort(strength), True
-        model.actuator_gear[row, 0] = 1.0
-        model.actuator_ctrllimited[row] = False
-    model.actuator_gaintype[row] = mujoco.mjtGain.mjGAIN_FIXED
-    model.actuator_biastype[row] = mujoco.mjtBias.mjBIAS_AFFINE
-    model.actuator_gainprm[row, 0] = p
-    model.actuator_biasprm[row, :3] = 0.0, -p, -d
 
 
 def misfit(robot: str, walking: Walking, why: str) -> RebodyError:
