@@ -27,10 +27,10 @@ class WalkingConfig(OffPolicyConfig):
     """Share of a batch whose commands are drawn anew."""
     segment_s: tuple[Positive, Positive] = (1.0, 8.0)
     """Shortest and longest time between changes of the command [s]."""
-    drag_iterations: Number = 250
+    drag_iterations: Number = 200
     """Over so many iterations the price of dragging feet grows from nothing to all of it: a robot that must lift them
     before it can walk learns to stand instead."""
-    smoothing_s: NotNegative = 0.2
+    smoothing_s: NotNegative = 0.12
     """Time constant of the running mean of the speeds, which counts for half in the reward [s]."""
     push_every_s: Positive = 3.0
     """Mean time between pushes [s]."""

@@ -30,12 +30,14 @@ class WalkingReward:
     """Paid in full at the wanted turn, less by a Gaussian of the error."""
     turn_width: Positive = 0.27
     """Standard deviation of that Gaussian [rad/s]."""
-    relative_turn: NotNegative = 0.6
+    relative_turn: NotNegative = 0.4
     """Paid in full at the wanted turn, less by the error relative to it: without it none turns on the spot."""
     slowest_turn: Positive = 0.3
     """Least turn that errors are relative to [rad/s]."""
-    wobble: NotNegative = 0.3
-    """Metres that count as a radian where one of the two is asked for: who turns on the spot may sway."""
+    sway: NotNegative = 0.3
+    """Metres per radian: who turns is paid by errors of the speed relative to so much of the wanted turn at least."""
+    weave: NotNegative = 0.8
+    """Radians per metre: who walks is paid by errors of the turn relative to so much of the wanted speed at least."""
     tilt: NotNegative = 1.0
     """Times the tilt."""
     change: NotNegative = 0.15
@@ -48,7 +50,7 @@ class WalkingReward:
     """Share of the height that may be missing."""
     stir: NotNegative = 0.03
     """Times the mean squared joint velocity while none is commanded: who is told nothing stands still."""
-    drag: NotNegative = 0.25
+    drag: NotNegative = 0.1
     """Per m/s of feet that slide: who moves a foot lifts it."""
     alive: NotNegative = 0.2
     """Paid as long as it has not fallen."""
@@ -68,8 +70,8 @@ def walking_reward(
     error, is_none = stride.speed - command, jnp.linalg.norm(command, axis=-1) < NO_COMMAND
     miss, turn = jnp.sqrt(jnp.sum(error[..., :2] ** 2, axis=-1) + 1e-6), jnp.abs(error[..., 2])
     wanted, wanted_turn = jnp.linalg.norm(command[..., :2], axis=-1), jnp.abs(command[..., 2])
-    size = jnp.maximum(jnp.maximum(wanted, weights.slowest), weights.wobble * wanted_turn)
-    size_turn = jnp.maximum(jnp.maximum(wanted_turn, weights.slowest_turn), weights.wobble * wanted)
+    size = jnp.maximum(jnp.maximum(wanted, weights.slowest), weights.sway * wanted_turn)
+    size_turn = jnp.maximum(jnp.maximum(wanted_turn, weights.slowest_turn), weights.weave * wanted)
     follows = (
         weights.relative * jnp.maximum(1 - miss / size, -0.5)
         + weights.speed * jnp.exp(-0.5 * (miss / weights.speed_width) ** 2)
