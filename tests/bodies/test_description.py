@@ -15,7 +15,7 @@ ANT = Path(__file__).parents[2] / "examples" / "ant" / "ant.toml"
 
 
 def test_these_robots_are_shipped():
-    assert shipped_robots() == ("cheetah", "hopper", "walker")
+    assert shipped_robots() == ("cheetah", "hopper", "quadruped", "walker")
 
 
 @pytest.mark.parametrize("name", [*shipped_robots(), str(ANT)])
@@ -23,7 +23,7 @@ def test_a_described_robot_can_be_used(name):
     spec = load_robot(name)
     assert spec.name == Path(name).stem
     assert spec.steps_per_decision * spec.control_dt == pytest.approx(0.1)
-    speed = dict(spec.reach)["velocity"]
+    speed = next(box for family, box in spec.reach if family.startswith("velocity"))
     assert speed.low[0] < 0 < speed.high[0]
     batch = RobotBatch(spec, 2, threads=1)
     batch.reset(np.random.default_rng(0))
@@ -165,5 +165,5 @@ def test_a_model_that_cannot_be_used_is_named(write_own, toml, mjcf, says):
 
 
 def test_an_unknown_name_is_no_path():
-    with pytest.raises(RebodyError, match=r"Did you mean 'hopper'\?.*cheetah, hopper, walker, or the path"):
+    with pytest.raises(RebodyError, match=r"Did you mean 'hopper'\?.*cheetah, hopper, quadruped, walker, or the path"):
         load_robot("hoper")

@@ -29,8 +29,8 @@ def test_list_names_whatever_there_is(capsys: pytest.CaptureFixture[str]):
     assert run(["list"]) == 0
     printed = capsys.readouterr().out
     for name in (
-        "point-mass", "cheetah", "hopper", "walker", "goal", "velocity", "readout", "bayes", "position-thesis",
-        "tracker-cheetah", "6.9",
+        "point-mass", "cheetah", "hopper", "quadruped", "walker", "goal", "velocity", "readout", "bayes",
+        "position-thesis", "tracker-cheetah", "6.9",
     ):  # fmt: skip
         assert name in printed
 
@@ -99,7 +99,10 @@ def test_run_draws_an_episode(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (["train", "tracker", "--robot", "hopper", "--out", "x"], "write `rebody train tracker ROBOT --out"),
         (["stress", "--robot", "cheetah", "--tracker", ""], "not a complete artifact"),  # '' is this folder
         (["train", "tracker", "hoper", "--out", "x"], "Did you mean 'hopper'"),
-        (["robot", "check", "hoper"], "Robots are: cheetah, hopper, walker, or the path of a robot's TOML file"),
+        (
+            ["robot", "check", "hoper"],
+            "Robots are: cheetah, hopper, quadruped, walker, or the path of a robot's",
+        ),
         (["robot", "check", "none.toml"], "cannot read the robot's file 'none.toml'"),
         (["stress", "--robot", "./none.toml"], "cannot read the robot's file 'none.toml'"),
         (["stress", "--episodes", "0"], "--episodes must be at least 1"),

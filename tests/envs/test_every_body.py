@@ -10,7 +10,7 @@ from rebody.tasks.line import LINE
 
 TARGETS = {"goal": -3.0, "velocity": 1.5, "stand": 0.5, "jump": 1.0}
 CAN_DO = [("point-mass", "goal"), ("point-mass", "velocity")] + [
-    (robot, family) for robot in shipped_robots() for family, _ in load_robot(robot).reach
+    (robot, family) for robot in shipped_robots() for family, _ in load_robot(robot).reach if family in LINE.names
 ]
 
 

@@ -13,7 +13,8 @@ from rebody.bodies import RobotBatch, simulate
 from rebody.bodies.check_model import Finding, check_model
 from rebody.bodies.model import NOT_USED, carried_by
 from rebody.bodies.robot import RobotSpec
-from rebody.bodies.walking.policy import WalkingPolicy
+from rebody.bodies.walking.batch import JointBatch, joint_interface
+from rebody.bodies.walking.policy import WalkingPolicy, has_policy
 from rebody.errors import RebodyError
 from rebody.types import GLOBAL_FIELDS
 
@@ -54,10 +55,13 @@ def _finding(subject: str, look: Look, spec: RobotSpec) -> Finding:
 
 
 def _policy(spec: RobotSpec) -> tuple[bool, str]:
-    """Of a robot that walks already."""
+    """Of a robot that follows a joystick, or is to learn it."""
     assert spec.walking is not None
-    policy = WalkingPolicy(spec.name, spec.walking, spec.model, spec.rest_qpos, spec.root_body)
-    return True, f"it moves {len(policy.actuators)} joints and hears {policy.hears}"
+    if not has_policy(spec.walking):
+        joints = joint_interface(spec)
+        return True, f"yet to be learned: it is to move {len(joints.names)} joints and hear {joints.hears}"
+    joints = WalkingPolicy(spec.name, spec.walking, spec.model, spec.rest_qpos, spec.root_body).joints
+    return True, f"it moves {len(joints.names)} joints and hears {joints.hears}"
 
 
 def _does_nothing(spec: RobotSpec) -> tuple[bool, str]:
@@ -69,7 +73,7 @@ def _moves_at_random(spec: RobotSpec) -> tuple[bool, str]:
 
 
 def _run(spec: RobotSpec, amplitude: float) -> tuple[bool, str]:
-    rng, batch = np.random.default_rng(0), simulate(spec, COPIES, threads=1)
+    rng, batch = np.random.default_rng(0), _copies(spec, COPIES)
     batch.reset(rng)
     steps, fell_at = round(SECONDS / spec.control_dt), None
     for step in range(steps):
@@ -80,6 +84,12 @@ def _run(spec: RobotSpec, amplitude: float) -> tuple[bool, str]:
         return False, "positions run away: lower the time step"
     fall = "no copy fell" if fell_at is None else f"first of {batch.size} copies fallen after {fell_at:.2g} s"
     return True, f"{SECONDS:g} s, {fall}"
+
+
+def _copies(spec: RobotSpec, size: int) -> RobotBatch:
+    """As the robot is used; moved around its rest pose where a policy is yet to be learned."""
+    learns_to_walk = spec.walking is not None and not has_policy(spec.walking)
+    return (JointBatch if learns_to_walk else simulate)(spec, size, threads=1)
 
 
 def _is_sound(qpos: Float[np.ndarray, "robot nq"]) -> bool:
@@ -119,7 +129,7 @@ def _pushed(spec: RobotSpec) -> tuple[bool, str]:
 
 def _speed(spec: RobotSpec, axis: int, field: str) -> float:
     """What a push along an axis reads as [m/s]."""
-    batch = simulate(spec, 1, threads=1)
+    batch = _copies(spec, 1)
     batch.reset(np.random.default_rng(0))
     batch.push(np.eye(2)[[axis]])
     for _ in range(spec.steps_per_decision):
@@ -129,7 +139,7 @@ def _speed(spec: RobotSpec, axis: int, field: str) -> float:
 
 def _trained(spec: RobotSpec) -> tuple[bool, str]:
     """All that training calls: what is read is finite, and a saved state continues to the last bit, as does a reset."""
-    rng, batch, twin = np.random.default_rng(0), simulate(spec, COPIES, 1), simulate(spec, COPIES, 1)
+    rng, batch, twin = np.random.default_rng(0), _copies(spec, COPIES), _copies(spec, COPIES)
     batch.reset(rng)
     actions = rng.uniform(-1, 1, (2, spec.steps_per_decision, COPIES, batch.actions))
     batch.push(rng.uniform(-1, 1, COPIES))
@@ -141,7 +151,7 @@ def _trained(spec: RobotSpec) -> tuple[bool, str]:
     if not all(np.isfinite(numbers).all() for numbers in read):
         return False, "what is read of it is not finite"
     batch.reset(np.random.default_rng(1))
-    twin = simulate(spec, COPIES, 1)
+    twin = _copies(spec, COPIES)
     twin.reset(np.random.default_rng(1))
     if not np.array_equal(_act(batch, actions[0]), _act(twin, actions[0])):
         return False, "after a reset it does not move as a new one: the model keeps some of its state"

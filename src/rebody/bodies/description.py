@@ -5,6 +5,7 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from rebody.bodies.model import Space
 from rebody.bodies.robot import Fall, Reach, RobotSpec
 from rebody.bodies.walking.joystick import NAVIGATED_M, Joystick
 from rebody.bodies.walking.settings import Phase, Term, Walking
+from rebody.bodies.walking.trained import TrainedPolicy
 from rebody.errors import RebodyError, unknown
 from rebody.names import ROBOTS, shipped_robots
 from rebody.ranges import Box
@@ -23,6 +25,8 @@ from rebody.store.files import TEXT, read_file
 
 GYMNASIUM_ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
 GYMNASIUM_PREFIX = "gymnasium:"
+MEASURED = ("dead", "drift", "at_once", "rate")
+"""What `rebody robot check` tells of a joystick, and training of one that is learned here."""
 
 
 class _Root(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -50,15 +54,16 @@ class _Joystick(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     forward: tuple[float, float]
     sideways: tuple[float, float]
     turn: tuple[float, float]
-    dead: tuple[float, float, float] = Joystick.dead
-    drift: tuple[float, float, float] = Joystick.drift
-    at_once: float = Joystick.at_once
-    rate: float = Joystick.rate
+    dead: tuple[float, float, float] | None = None
+    drift: tuple[float, float, float] | None = None
+    at_once: float | None = None
+    rate: float | None = None
 
 
 class _Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    onnx: str
     joystick: _Joystick
+    onnx: str | None = None
+    artifact: str | None = None
     inputs: tuple[Term, ...] = ()
     imu: str | None = None
     action_scale: float | tuple[float, ...] | None = None
@@ -71,6 +76,8 @@ class _Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     phase: _Phase | None = None
     stiffness: tuple[float, ...] = ()
     damping: tuple[float, ...] = ()
+    feet: tuple[str, ...] = ()
+    mirror: tuple[str, ...] = ()
 
 
 class _Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -151,7 +158,7 @@ def _with_variables(said: str, path: Path) -> str:
 
 def _walking(policy: _Policy, path: Path) -> Walking:
     """RebodyError for what cannot be."""
-    said, stick = msgspec.structs.asdict(policy), policy.joystick
+    stick, artifact = policy.joystick, _artifact(policy, path)
     problems = [
         f"{name} must be at least {least}, and finite"
         for name, value, least in (("history", policy.history, 1), ("phase.frequency", _frequency(policy), 0))
@@ -160,24 +167,42 @@ def _walking(policy: _Policy, path: Path) -> Walking:
     ways = (stick.forward, stick.sideways, stick.turn)
     if not all(-math.inf < low <= 0 <= high < math.inf for low, high in ways):
         problems.append("joystick: each way must be [low, high] around 0")
-    if not all(0 <= slowest < math.inf for slowest in stick.dead):
+    if not all(0 <= slowest < math.inf for slowest in stick.dead or ()):
         problems.append("joystick.dead must not be negative")
-    if not 1 <= stick.at_once <= len(ways):
+    if stick.at_once is not None and not 1 <= stick.at_once <= len(ways):
         problems.append(f"joystick.at_once must be from 1 to {len(ways)}")
-    if not stick.rate > 0:
+    if stick.rate is not None and not stick.rate > 0:
         problems.append("joystick.rate must be positive")
+    if policy.onnx is not None and artifact is not None:
+        problems.append("onnx and artifact are two policies: say one")
     if problems:
         raise RebodyError(f"'{path}': [policy] {'; '.join(problems)}.")
-    low, high = zip(*ways, strict=True)
     return Walking(
-        **said
+        **msgspec.structs.asdict(policy)
         | {
-            "onnx": path.parent / _with_variables(policy.onnx, path),
-            "joystick": Joystick(Box(low, high), stick.dead, stick.drift, stick.at_once, stick.rate),
+            "onnx": None if policy.onnx is None else path.parent / _with_variables(policy.onnx, path),
+            "artifact": artifact,
+            "joystick": _joystick(stick, artifact),
             "scales": tuple(policy.scales.items()),
             "phase": policy.phase and Phase(**msgspec.structs.asdict(policy.phase)),
         }
     )
+
+
+def _artifact(policy: _Policy, path: Path) -> str | None:
+    """A shipped name as it is, a folder from where the description is."""
+    if policy.artifact is None or "/" not in policy.artifact:
+        return policy.artifact
+    return str(path.parent / _with_variables(policy.artifact, path))
+
+
+def _joystick(said: _Joystick, artifact: str | None) -> Joystick:
+    """What it says; where it is silent, what its artifact has measured, if there is one by now."""
+    low, high = zip(said.forward, said.sideways, said.turn, strict=True)
+    policy = None if artifact is None else TrainedPolicy(artifact)
+    measured = policy.settings.joystick if policy and policy.is_there else Joystick(Box(low, high))
+    own = {name: value for name in MEASURED if (value := getattr(said, name)) is not None}
+    return replace(measured, limits=Box(low, high), **own)
 
 
 def _frequency(policy: _Policy) -> float:

@@ -49,6 +49,7 @@ COMMANDS = (
     Command("figure", "figure", "Figures"),
     Command("report", "report", "Report"),
     Command("robot", "robot", "Robot"),
+    Command("export", "export", "Export"),
     Command("stress", "stress", "Stress"),
     Command("list", "listing", "List"),
 )

@@ -77,9 +77,9 @@ class Demo:
 
 
 def robots_with_tracker() -> list[str]:
-    """Robots whose tracker ships."""
-    artifacts = dict(shipped_artifacts())
-    return [robot for robot in shipped_robots() if f"tracker-{robot}" in artifacts]
+    """Robots of the line whose tracker ships."""
+    trackers = {name for name, kind in shipped_artifacts() if kind == "tracker"}
+    return [robot for robot in shipped_robots() if f"tracker-{robot}" in trackers]
 
 
 def hidden_tasks(trial: Trial) -> list[TaskSpec]:

@@ -14,6 +14,7 @@ from rich.table import Table
 from rebody.bodies import load_robot
 from rebody.bodies.check import check_robot
 from rebody.bodies.walking.measure import STANDS, WalkingMeasured, measure_walking
+from rebody.bodies.walking.policy import has_policy
 from rebody.cli.output import PICTURES, check_output
 from rebody.errors import RebodyError
 from rebody.report.walking import UNITS, plot_walking
@@ -43,7 +44,7 @@ class Robot:
         wrong = [finding.subject for finding in findings if not finding.is_right]
         if wrong:
             raise RebodyError(f"robot '{spec.name}' is not ready: see {', '.join(wrong)}.")
-        if spec.walking is None:
+        if spec.walking is None or not has_policy(spec.walking):
             console.print(f"ready: rebody train tracker {self.robot} --out runs/tracker-{spec.name}", markup=False)
             return
         measured = measure_walking(spec)

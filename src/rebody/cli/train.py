@@ -14,7 +14,7 @@ from rebody.control.command import commands_within
 from rebody.errors import RebodyError, unknown
 from rebody.names import presets
 from rebody.ranges import Seed, interval
-from rebody.tasks import SHIPPED
+from rebody.tasks import SHIPPED, FamilySet
 from rebody.tasks.family_file import read_families
 from rebody.training.classifier import ClassifierConfig, train_classifier
 from rebody.training.flat import FlatConfig, train_flat
@@ -24,6 +24,7 @@ from rebody.training.navigator import NavigatorConfig, train_navigator
 from rebody.training.scratch import ScratchConfig, train_scratch
 from rebody.training.step_predictor import StepPredictorConfig, train_step_predictor
 from rebody.training.tracker import TrackerConfig, tracker_preset, train_tracker
+from rebody.training.walking import WalkingConfig, train_walking
 
 FLAT = tyro.conf.arg(name="")
 """Settings whose options have no prefix."""
@@ -86,6 +87,19 @@ class TrainTracker:
         reach = tuple((dict(load_robot(self.robot).reach) | own).items())
         families = commands_within(reach, self.config.families.beside(SHIPPED))
         _show_card(train_tracker(self.robot, replace(self.config, families=families), **vars(self.options)))
+
+
+@dataclass(frozen=True)
+class TrainWalking:
+    """Train the walking policy of a robot that is to follow a joystick: (what it feels, command) -> joint targets."""
+
+    robot: Named
+    config: Annotated[WalkingConfig, FLAT] = field(default_factory=WalkingConfig)
+    options: Start = field(default_factory=StartOptions)
+
+    def run(self) -> None:
+        """Train, save, say where."""
+        _show_card(train_walking(self.robot, self.config, **vars(self.options)))
 
 
 @dataclass(frozen=True)
@@ -204,7 +218,7 @@ def train_command(arguments: Sequence[str]) -> type:
     robots |= {} if own is None or own in robots else {own: "The tracker of your own robot."}
     of_preset = {name: TrainInference(name, preset()) for name, preset in PRESETS.items()}
     known = read_families(_value_of("--families", arguments))
-    of_robot = {name: TrainTracker(name, tracker_preset(load_robot(name), known)) for name in robots}
+    of_robot = {name: _tracker_of(name, known) for name in robots}
     parts = {
         "inference": _one_of(of_preset, TrainInference.__doc__, presets()),
         "tracker": _one_of(of_robot, f"{TrainTracker.__doc__} Your own: the path of its TOML file.", robots),
@@ -216,6 +230,12 @@ def train_command(arguments: Sequence[str]) -> type:
         "step-predictor": TrainStepPredictor,
     }
     return _one_of(parts, train_command.__doc__)
+
+
+def _tracker_of(robot: str, known: FamilySet) -> TrainTracker | TrainWalking:
+    """What is trained for a robot: that it follows a joystick, or subgoals."""
+    spec = load_robot(robot)
+    return TrainTracker(robot, tracker_preset(spec, known)) if spec.walking is None else TrainWalking(robot)
 
 
 def _one_of(kinds: dict[str, Any], doc: str | None, lines: dict[str, str] | None = None) -> type:

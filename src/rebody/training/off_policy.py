@@ -68,6 +68,10 @@ class Learner(ABC, Generic[World]):
     spec: RobotSpec
     config: OffPolicyConfig
 
+    def simulate(self, size: int) -> RobotBatch:
+        """The robots that it moves."""
+        return RobotBatch(self.spec, size)
+
     @abstractmethod
     def sizes(self, batch: RobotBatch) -> tuple[int, int]:
         """Numbers that the policy sees, and numbers of an action."""
@@ -129,7 +133,7 @@ def train(
     """
     config, seed = learner.config, settings["seed"]
     with Run(out, asdict(config) | settings | {"init_from": init_from}, resume=resume, finish=finish) as run:
-        batch = RobotBatch(learner.spec, config.robots)
+        batch = learner.simulate(config.robots)
         batch.reset(np.random.default_rng((seed, 1)))
         state = run.restore(initial_state(learner, batch, jax.random.key(seed), init_from))
         batch.state = state.physics

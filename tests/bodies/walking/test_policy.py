@@ -9,6 +9,7 @@ import pytest
 from tests.walking import CART, write_linear
 
 from rebody.bodies.walking import Joystick, Walking
+from rebody.bodies.walking.joints import JointInterface
 from rebody.bodies.walking.policy import WalkingPolicy
 from rebody.bodies.walking.settings import Phase
 from rebody.errors import RebodyError
@@ -68,7 +69,7 @@ def test_joints_are_heard_from_the_rest_pose_in_the_order_asked_for(moving, tmp_
     numbers = heard(policy, moving.qpos[None], moving.qvel[None])[0]
     expected = [0.9 + 0.2, 0.5 - 0.3, moving.qvel[7], moving.qvel[6], *2 * COMMAND[0]]
     np.testing.assert_allclose(numbers, expected, atol=1e-9)
-    np.testing.assert_array_equal(policy.actuators, [1, 0])
+    np.testing.assert_array_equal(policy.joints.actuators, [1, 0])
     deaf = policy_of(tmp_path, inputs, 7, unheard=("left",))
     np.testing.assert_allclose(
         heard(deaf, moving.qpos[None], moving.qvel[None])[0][:4], [0.0, 1.1, 0.0, moving.qvel[7]], atol=1e-9
@@ -109,7 +110,7 @@ def test_a_history_is_told_term_by_term_the_oldest_first(moving, tmp_path):
     gait = policy.begin(1)
     policy.step(gait, moving.qpos[None], moving.qvel[None], COMMAND, 0.02)
     policy.step(gait, moving.qpos[None], moving.qvel[None], 2 * COMMAND, 0.02)
-    np.testing.assert_allclose(policy._stacked(gait.heard)[0], [*COMMAND[0], *2 * COMMAND[0], 0.7, 0.7])
+    np.testing.assert_allclose(policy.joints._stacked(gait.heard)[0], [*COMMAND[0], *2 * COMMAND[0], 0.7, 0.7])
 
 
 def test_what_mjlab_writes_is_read_from_the_file(moving, tmp_path):
@@ -127,7 +128,7 @@ def test_what_mjlab_writes_is_read_from_the_file(moving, tmp_path):
     np.testing.assert_allclose(gait.heard[0, -1, :3], moving.qvel[3:6], atol=1e-9)
     np.testing.assert_allclose(targets[0], [0.1 + 0.5 * moving.qvel[3], 0.2 + 0.25 * moving.qvel[4]], atol=1e-6)
     model = mujoco.MjModel.from_xml_string(CART)
-    policy.drive(model)
+    policy.joints.drive(model)
     np.testing.assert_array_equal(model.actuator_gainprm[:, 0], [30.0, 20.0])
     np.testing.assert_array_equal(model.actuator_biasprm[:, :3], [[0.0, -30.0, -2.0], [0.0, -20.0, -1.0]])
 
@@ -136,8 +137,8 @@ def test_what_holosoma_writes_is_read_too(tmp_path):
     metadata = {"dof_names": json.dumps(["right", "left"]), "kp": "[20, 30]", "kd": "[1, 2]"}
     policy = policy_of(tmp_path, ("command",), 3, metadata=metadata)
     model = mujoco.MjModel.from_xml_string(CART)
-    policy.drive(model)
-    np.testing.assert_array_equal(policy.actuators, [1, 0])
+    policy.joints.drive(model)
+    np.testing.assert_array_equal(policy.joints.actuators, [1, 0])
     np.testing.assert_array_equal(model.actuator_gainprm[:, 0], [30.0, 20.0])
     np.testing.assert_array_equal(model.actuator_biasprm[:, 2], [-2.0, -1.0])
 
@@ -147,11 +148,31 @@ def test_motors_become_servos_as_strong_as_they_were(tmp_path):
     motors = CART.replace('<velocity name="left" joint="left" kv="2"', '<motor name="left" joint="left" gear="-3"')
     model = mujoco.MjModel.from_xml_string(motors)
     for _ in range(2):
-        policy_of(tmp_path, ("command",), 3, stiffness=(1e6, 1e6), damping=(1.0, 1.0)).drive(model)
+        policy_of(tmp_path, ("command",), 3, stiffness=(1e6, 1e6), damping=(1.0, 1.0)).joints.drive(model)
     data = mujoco.MjData(model)
     data.ctrl[:] = 1.0
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.qfrc_actuator[[6, 7]], [90.0, 1e6])
+
+
+def test_a_motor_as_a_servo_pulls_with_its_gains_up_to_its_strength():
+    arm = """
+    <mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1"/>
+      <body name="arm"><joint name="elbow" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/></body>
+    </body></worldbody><actuator>
+      <motor joint="elbow" gear="150" ctrlrange="-0.5 1"/>
+    </actuator></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(arm)
+    walking = Walking(None, STICK, inputs=("command",), stiffness=(40.0,), damping=(2.0,))
+    joints = JointInterface("arm", walking, model, model.qpos0, 1, {})
+    assert joints.gains_in(model) == ([], [])
+    joints.drive(model)
+    assert joints.gains_in(model) == ([40.0], [2.0])
+    data = mujoco.MjData(model)
+    for target, speed, expected in ((1.0, 0.0, 40.0), (1.0, 5.0, 30.0), (9.0, 0.0, 150.0), (-9.0, 0.0, -75.0)):
+        data.ctrl[:], data.qvel[6] = target, speed
+        mujoco.mj_forward(model, data)
+        np.testing.assert_allclose(data.qfrc_actuator[6], expected)
 
 
 @pytest.mark.parametrize(

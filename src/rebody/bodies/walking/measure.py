@@ -1,13 +1,15 @@
 """What a walking policy makes of commands: reached speeds, dead band, lag, drift and falls, measured on the robot."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from rebody.bodies.robot import RobotSpec
+from rebody.bodies.walking.batch import WalkingBatch
 from rebody.bodies.walking.joystick import WAYS
-from rebody.bodies.walking.stick import SETTLES_S, fastest_stick, walk, ways_at_once
+from rebody.bodies.walking.stick import SETTLES_S, Followers, fastest_stick, walk, ways_at_once
 
 SHARES = tuple(np.linspace(0.05, 1.0, 20).tolist())
 """Of a way's limits, both ends."""
@@ -63,23 +65,27 @@ class WalkingMeasured:
         return sum(int(way.fell.sum()) for way in self.ways)
 
 
-def measure_walking(spec: RobotSpec) -> WalkingMeasured:
-    """A robot for each command of each way, all from rest, for 6 s; RebodyError where one diverges."""
+def measure_walking(spec: RobotSpec, followers: Followers | None = None) -> WalkingMeasured:
+    """A robot for each command of each way, all from rest, for 6 s; RebodyError where one diverges.
+
+    `followers` makes so many of them, where they do not walk by the policy of their description.
+    """
+    followers = followers or partial(WalkingBatch, spec)
     assert spec.walking is not None
     limits, commands = spec.walking.joystick.limits, [np.zeros(len(WAYS))]
     for way in range(len(WAYS)):
         for end in (limits.low[way], limits.high[way]):
             commands += [share * end * np.eye(len(WAYS))[way] for share in SHARES if end]
     command = np.array(commands)
-    speeds, fell = walk(spec, command)
+    speeds, fell = walk(followers(len(command)), command, spec.control_dt)
     settled = speeds[round(SETTLES_S / spec.control_dt) :].mean(axis=0)
     ahead = int(np.argmax(command[:, 0]))
     window = max(1, round(GAIT_S / spec.control_dt))
     reached = np.convolve(speeds[:, ahead, 0], np.full(window, 1 / window), "same")
     lag = np.argmax(reached >= 0.63 * settled[ahead, 0]) * spec.control_dt
-    drift, at_once = settled[0], ways_at_once(spec, settled[0])
+    drift, at_once = settled[0], ways_at_once(spec, followers, settled[0])
     ways = tuple(_way(i, command, settled, fell) for i in range(len(WAYS)))
-    return WalkingMeasured(ways, drift, float(lag), at_once, fastest_stick(spec, at_once))
+    return WalkingMeasured(ways, drift, float(lag), at_once, fastest_stick(spec, followers, at_once))
 
 
 def _way(i: int, command: np.ndarray, settled: np.ndarray, fell: np.ndarray) -> WayMeasured:

@@ -1,94 +1,32 @@
-"""A walking policy on one robot's model: what it hears of joint positions and velocities, and where it moves joints."""
+"""A walking policy on one robot's model: its network between what it hears and where it moves joints."""
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from rebody.bodies.attitude import inverse, product
-from rebody.bodies.walking.metadata import FileSays
+from rebody.bodies.walking.joints import Gait, JointInterface, misfit
 from rebody.bodies.walking.onnx_file import OnnxPolicy
-from rebody.bodies.walking.settings import Term, Walking
-from rebody.errors import RebodyError, did_you_mean
-
-NO_COMMAND = 0.01
-"""Commands shorter than this are none [m/s, rad/s]."""
-
-
-@dataclass
-class Gait:
-    """What a policy remembers of each robot from one control step to the next."""
-
-    last_action: Float[np.ndarray, "robot joint"]
-    phase: Float[np.ndarray, "robot leg"]  # rad
-    heard: Float[np.ndarray, "robot step number"]  # the newest last
-    memory: dict[str, Float[np.ndarray, "robot ..."]]
-
-    def parts(self) -> list[np.ndarray]:
-        """All its arrays, in a fixed order."""
-        return [self.last_action, self.phase, self.heard, *self.memory.values()]
+from rebody.bodies.walking.settings import Walking
+from rebody.bodies.walking.trained import TrainedPolicy
+from rebody.errors import RebodyError
 
 
 class WalkingPolicy:
-    """One control step for many robots; RebodyError where file, description and model do not fit together."""
+    """One control step for many robots; RebodyError where policy, description and model do not fit together."""
 
     def __init__(self, robot: str, walking: Walking, model: mujoco.MjModel, rest: Float[np.ndarray, " nq"], root: int):
         """`rest` are the joint positions of the rest pose, `root` the id of the body that floats freely."""
-        self._robot, self._walking, self._file = robot, walking, OnnxPolicy(walking.onnx)
-        self._root = int(model.jnt_qposadr[model.body_jntadr[root]]), int(model.jnt_dofadr[model.body_jntadr[root]])
-        self._imu = self._frame(model, root)
-        says = FileSays(self._file.metadata, self._misfit)
-        self._inputs = walking.inputs or says.inputs
-        if not self._inputs:
-            raise self._misfit("[policy] names no inputs, and the file says nothing of its own")
-        self._scales = dict(walking.scales) if walking.inputs else says.scales | dict(walking.scales)
-        self._history = walking.history if walking.inputs else says.history or walking.history
-        actuators = self._actuators(model, walking.joints or says.joints)
-        joints = model.actuator_trnid[actuators, 0]
-        self.actuators: Int[np.ndarray, " joint"] = actuators
-        self._at, self._moves = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-        self._unheard = self._indices([model.joint(i).name for i in joints], walking.unheard)
-        self._rest, self._high = rest[self._at], float(rest[self._root[0] + 2])
-        default, scale = says.of_joints("default_joint_pos", len(joints)), walking.action_scale
-        self._centre = self._rest if default is None else default
-        scale = says.of_joints("action_scale", len(joints)) if scale is None else scale
-        self._scale = np.broadcast_to(1.0 if scale is None else np.asarray(scale), len(joints))
-        gains = ((walking.stiffness, "joint_stiffness"), (walking.damping, "joint_damping"))
-        self._gains = [np.asarray(own) if own else says.of_joints(key, len(joints)) for own, key in gains]
-        self._check(len(joints))
-
-    @property
-    def hears(self) -> str:
-        """In words, with how many numbers each."""
-        terms = ", ".join(f"{name} {self._size(name)}" for name in self._inputs)
-        return terms if self._history == 1 else f"{terms}; {self._history} steps of each"
-
-    def drive(self, model: mujoco.MjModel) -> None:
-        """Make the model's motors servos of these gains, as strong as the motors, where there are any, in place."""
-        stiffness, damping = self._gains
-        if stiffness is None or damping is None:
-            return
-        for row, p, d in zip(self.actuators.tolist(), stiffness, damping, strict=True):
-            if model.actuator_biastype[row] == mujoco.mjtBias.mjBIAS_NONE:
-                _limit_force(model, row)
-            model.actuator_gaintype[row] = mujoco.mjtGain.mjGAIN_FIXED
-            model.actuator_biastype[row] = mujoco.mjtBias.mjBIAS_AFFINE
-            model.actuator_gainprm[row, 0] = p
-            model.actuator_biasprm[row, :3] = 0.0, -p, -d
-            model.actuator_ctrllimited[row] = False
+        self._network = _network(robot, walking)
+        self.joints = JointInterface(robot, _spoken_for(walking), model, rest, root, self._network.metadata)
+        self._check(robot, walking)
 
     def begin(self, robots: int) -> Gait:
         """Robots that have just been reset."""
-        phase = self._walking.phase
-        offsets = np.zeros(0) if phase is None else np.asarray(phase.offsets)
-        return Gait(
-            np.zeros((robots, len(self._at)), np.float32),
-            np.tile(offsets, (robots, 1)),
-            np.zeros((robots, self._history, self._width)),
-            self._file.initial(robots),
-        )
+        gait = self.joints.begin(robots)
+        gait.memory = self._network.initial(robots)
+        return gait
 
     def step(
         self,
@@ -99,133 +37,37 @@ class WalkingPolicy:
         dt: float,
     ) -> Float[np.ndarray, "robot joint"]:
         """Where the joints are to be [rad], for a joystick command [m/s, rad/s]; the gait moves on, in place."""
-        now = np.concatenate(self._heard(gait, qpos, qvel, command), axis=-1)
-        gait.heard = np.concatenate([gait.heard[:, 1:], now[:, None]], axis=1)
-        seen = self._stacked(gait.heard).astype(np.float32)
-        if self._walking.clip is not None:
-            seen = np.clip(seen, -self._walking.clip, self._walking.clip)
-        action, gait.memory = self._file(seen, gait.memory)
-        if self._walking.action_clip is not None:
-            action = np.clip(action, -self._walking.action_clip, self._walking.action_clip)
-        gait.last_action = action
-        if self._walking.phase is not None:
-            turned = gait.phase + 2 * np.pi * self._walking.phase.frequency * dt
-            gait.phase = np.fmod(turned + np.pi, 2 * np.pi) - np.pi
-        return self._centre + self._scale * action
+        action, gait.memory = self._network(self.joints.hear(gait, qpos, qvel, command), gait.memory)
+        return self.joints.move(gait, action, dt)
 
-    def _heard(self, gait: Gait, qpos, qvel, command) -> list[Float[np.ndarray, "robot _"]]:
-        positions, velocities = qpos[:, self._at] - self._centre, qvel[:, self._moves].copy()
-        positions[:, self._unheard] = velocities[:, self._unheard] = 0.0
-        linear, angular, gravity = self._felt(qpos, qvel)
-        phase = self._clock(gait.phase, command)
-        terms = {
-            "linear_velocity": linear,
-            "angular_velocity": angular,
-            "gravity": gravity,
-            "command": command,
-            "command_linear": command[:, :2],
-            "command_turn": command[:, 2:],
-            "joint_positions": positions,
-            "joint_velocities": velocities,
-            "last_action": gait.last_action,
-            "phase": np.concatenate([np.cos(phase), np.sin(phase)], axis=-1),
-            "phase_cosine": np.cos(phase),
-            "phase_sine": np.sin(phase),
-            "height": qpos[:, [self._root[0] + 2]],
-        }
-        return [self._scales.get(name, 1.0) * terms[name] for name in self._inputs]
-
-    def _felt(self, qpos, qvel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """By the IMU, in its own frame: its velocity, how it turns, and which way is down."""
-        at, moves = self._root
-        attitude, turning = qpos[:, at + 3 : at + 7], qvel[:, moves + 3 : moves + 6]  # in the body's frame
-        where, turn = self._imu
-        linear = _turned(inverse(attitude), qvel[:, moves : moves + 3]) + np.cross(turning, where)
-        down = _turned(inverse(attitude), np.broadcast_to([0.0, 0.0, -1.0], linear.shape))
-        return _turned(inverse(turn), linear), _turned(inverse(turn), turning), _turned(inverse(turn), down)
-
-    def _clock(self, phase, command) -> Float[np.ndarray, "robot leg"]:
-        """What the clock shows."""
-        settings = self._walking.phase
-        if settings is None or settings.at_rest is None:
-            return phase
-        is_none = np.linalg.norm(command, axis=-1, keepdims=True) < NO_COMMAND
-        return np.where(is_none, settings.at_rest, phase)
-
-    def _stacked(self, heard: Float[np.ndarray, "robot step number"]) -> Float[np.ndarray, "robot seen"]:
-        """Term by term, each the oldest first."""
-        if self._history == 1:
-            return heard[:, 0]
-        ends = np.cumsum([self._size(name) for name in self._inputs])[:-1]
-        return np.concatenate([part.reshape(len(heard), -1) for part in np.split(heard, ends, axis=-1)], axis=-1)
-
-    def _size(self, name: Term) -> int:
-        joints, legs = len(self._at), 0 if self._walking.phase is None else len(self._walking.phase.offsets)
-        of_joints = dict.fromkeys(("joint_positions", "joint_velocities", "last_action"), joints)
-        of_parts = {"command_linear": 2, "command_turn": 1, "phase": 2 * legs, "phase_cosine": legs, "phase_sine": legs}
-        return ({"height": 1} | of_parts | of_joints).get(name, 3)
-
-    @property
-    def _width(self) -> int:
-        return sum(self._size(name) for name in self._inputs)
-
-    def _check(self, joints: int) -> None:
-        if self._walking.phase is None and any(name.startswith("phase") for name in self._inputs):
-            raise self._misfit("it hears a phase: say [policy.phase] frequency")
-        hears, gives = self._history * self._width, self._file.actions
-        if self._file.observations != hears:
-            said = f"the description says {hears} ({self.hears})"
-            raise self._misfit(f"it hears {self._file.observations} numbers, {said}")
-        for name in self._inputs:
-            size, scales = self._size(name), np.size(self._scales.get(name, 1.0))
-            if scales not in (1, size):
-                raise self._misfit(f"{name} is {size} numbers, and its scale is {scales}")
-        if any(gains is not None and len(gains) != joints for gains in self._gains):
-            raise self._misfit(f"stiffness and damping must be {joints} numbers each, one for each joint")
-        if gives != joints:
-            raise self._misfit(f"it gives {gives} numbers for {joints} joints")
-
-    def _frame(self, model: mujoco.MjModel, root: int) -> tuple[np.ndarray, np.ndarray]:
-        """Place [m] and attitude of the IMU in the root body's frame."""
-        if self._walking.imu is None:
-            return np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-        sites = {model.site(i).name: i for i in range(model.nsite)}
-        if self._walking.imu not in sites:
-            near = did_you_mean(self._walking.imu, sites)
-            raise self._misfit(f"the model has no site '{self._walking.imu}' for its IMU{near or '.'}".rstrip("."))
-        site = sites[self._walking.imu]
-        if model.site_bodyid[site] != root:
-            raise self._misfit(f"site '{self._walking.imu}' is not on the body that floats freely")
-        return model.site_pos[site].copy(), model.site_quat[site].copy()
-
-    def _actuators(self, model: mujoco.MjModel, joints: Any) -> Int[np.ndarray, " joint"]:
-        """Of each joint, in the policy's order."""
-        moves = {model.joint(int(model.actuator_trnid[i, 0])).name: i for i in range(model.nu)}
-        return np.array([moves[name] for name in self._known(moves, joints)]) if joints else np.arange(model.nu)
-
-    def _indices(self, names: list[str], chosen: tuple[str, ...]) -> list[int]:
-        return [names.index(name) for name in self._known(names, chosen)]
-
-    def _known(self, names: Any, chosen: Any) -> Any:
-        if missing := [name for name in chosen if name not in names]:
-            raise self._misfit(f"no actuator moves a joint '{missing[0]}' (those are {', '.join(names)})")
-        return chosen
-
-    def _misfit(self, why: str) -> RebodyError:
-        return RebodyError(f"robot '{self._robot}': its walking policy '{self._walking.onnx}' does not fit: {why}.")
+    def _check(self, robot: str, walking: Walking) -> None:
+        joints, network = self.joints, self._network
+        if network.observations != joints.observations:
+            said = f"the description says {joints.observations} ({joints.hears})"
+            raise misfit(robot, walking, f"it hears {network.observations} numbers, {said}")
+        if network.actions != len(joints.names):
+            raise misfit(robot, walking, f"it gives {network.actions} numbers for {len(joints.names)} joints")
 
 
-def _limit_force(model: mujoco.MjModel, row: int) -> None:
-    """Of a motor: what limits its input limits its force, in the joint's own units, before its input is an angle."""
-    strength = model.actuator_gainprm[row, 0] * model.actuator_gear[row, 0]
-    if model.actuator_ctrllimited[row]:
-        model.actuator_forcerange[row] = np.sort(strength * model.actuator_ctrlrange[row])
-        model.actuator_forcelimited[row] = True
-    model.actuator_gear[row, 0] = 1.0
+def has_policy(walking: Walking) -> bool:
+    """Whether there is one by now."""
+    return walking.onnx is not None or (walking.artifact is not None and TrainedPolicy(walking.artifact).is_there)
 
 
-def _turned(attitude: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Vectors turned by attitudes."""
-    attitude = np.broadcast_to(attitude, (*vector.shape[:-1], 4))
-    pure = np.concatenate([np.zeros_like(vector[..., :1]), vector], axis=-1)
-    return product(product(attitude, pure), inverse(attitude))[..., 1:]
+def _network(robot: str, walking: Walking) -> OnnxPolicy | TrainedPolicy:
+    """RebodyError for a robot that has none yet."""
+    if walking.onnx is not None:
+        return OnnxPolicy(walking.onnx)
+    if walking.artifact is not None:
+        return TrainedPolicy(walking.artifact)
+    raise RebodyError(
+        f"robot '{robot}' has no walking policy yet: `rebody train tracker` learns one, which its [policy] then names "
+        'by artifact = "FOLDER".'
+    )
+
+
+def _spoken_for(walking: Walking) -> Walking:
+    """What was learned here says by itself what it hears and moves: the description may be of another run by now."""
+    if walking.artifact is None:
+        return walking
+    return replace(walking, inputs=(), joints=(), action_scale=None, stiffness=(), damping=(), scales=(), history=1)

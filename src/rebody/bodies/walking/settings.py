@@ -40,11 +40,13 @@ class Phase:
 
 @dataclass(frozen=True)
 class Walking:
-    """A policy that follows a joystick, and what it hears and moves."""
+    """A policy that follows a joystick, and what it hears and moves; or the one that such a robot is to learn."""
 
-    onnx: Path
+    onnx: Path | None
     """Its file: one input of observations, one output of actions, and memory `NAME_in`, `NAME_out` where it has any."""
     joystick: Joystick
+    artifact: str | None = None
+    """One that was learned here, a shipped name or a folder, which says by itself what it hears and moves."""
     inputs: tuple[Term, ...] = ()
     """In their order; none for what the file's own metadata say (mjlab)."""
     imu: str | None = None
@@ -68,3 +70,8 @@ class Walking:
     """PD gains of each joint where the model has motors [N m/rad]; none for the model's own actuators."""
     damping: tuple[float, ...] = ()
     """[N m s/rad]"""
+    feet: tuple[str, ...] = ()
+    """Geoms that it stands on: a policy that is learned here lifts them instead of dragging them."""
+    mirror: tuple[str, ...] = ()
+    """Where left and right are alike: for each joint the one whose place it takes in a mirror, behind a minus where it
+    turns the other way. A policy that is learned here then learns both sides at once."""

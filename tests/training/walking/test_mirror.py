@@ -1,0 +1,42 @@
+"""In a mirror the physics is the same."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rebody.bodies import load_robot
+from rebody.bodies.walking.batch import JointBatch
+from rebody.errors import RebodyError
+from rebody.training.walking.mirror import mirror_of
+
+
+@pytest.fixture
+def quadruped():
+    return replace(load_robot("quadruped"), reset_noise=0.0)
+
+
+def test_a_quadruped_in_a_mirror_moves_as_the_mirror_shows(quadruped):
+    batch, rng = JointBatch(quadruped, 2, threads=1), np.random.default_rng(0)
+    mirror = mirror_of(batch.joints, quadruped.walking.mirror, "quadruped")
+    batch.reset(rng)
+    batch.push(np.array([[0.3, 0.4], [0.3, -0.4]]))
+    command = np.array([[0.5, 0.2, -0.3], [0.5, -0.2, 0.3]])
+    for _ in range(25):
+        action = rng.uniform(-1, 1, 12).astype(np.float32)
+        batch.step(np.stack([action, mirror.done(action)]))
+    one, other = batch.hear(command)
+    np.testing.assert_allclose(mirror.seen(one), other, atol=2e-3)
+    assert np.abs(one - other).max() > 0.1
+    np.testing.assert_array_equal(mirror.seen(mirror.seen(one)), one)
+    np.testing.assert_array_equal(mirror.ways(command[0]), command[1].astype(np.float32))
+
+
+def test_a_robot_may_have_no_mirror(quadruped):
+    assert mirror_of(JointBatch(quadruped, 1).joints, (), "quadruped") is None
+
+
+def test_a_mirror_names_every_joint(quadruped):
+    named = (*quadruped.walking.mirror[:-1], "RR_knee")
+    with pytest.raises(RebodyError, match=r"'quadruped': .policy. mirror must name each of its joints once"):
+        mirror_of(JointBatch(quadruped, 1).joints, named, "quadruped")
