@@ -3,11 +3,11 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rebody.bodies import shipped_robots
+from rebody.bodies import load_robot, shipped_robots
+from rebody.cli.demo_tasks import hidden_tasks, shown_task
 from rebody.cli.output import check_output
 from rebody.cli.run import describe, shoot
 from rebody.cli.trial import TrialOptions
@@ -19,13 +19,11 @@ from rebody.evaluation.trial import Trial
 from rebody.report import plot_episode, plot_transfer
 from rebody.report.page.tables import vector
 from rebody.store import shipped_artifacts
-from rebody.tasks.task_file import Switch, TaskSpec
 
-HIDDEN_GOALS = np.linspace(2.0, 12.0, 5)
-SPEEDS, SLOWEST = 5, 1.0
-"""Speeds either way, from the slowest that the module learned on [m/s] to the fastest that the tracker did."""
-SHOWN_S, CHANGE_S = 16.0, 5.0
-"""Length of the filmed episode [s], and when its task changes: early enough that every robot can come back."""
+SHOWN_S = 16.0
+"""Length of the filmed episode [s]."""
+PLANE = "plane"
+"""Module of the robots that walk by a policy which was learned here; the others have the default one."""
 
 
 @dataclass(frozen=True)
@@ -43,22 +41,24 @@ class Demo:
             "now drives robots that it has never seen. Nobody tells it the task.\n",
             highlight=False,
         )
-        for path in (path for robot in robots_with_tracker() for path in self._files(robot)):
+        trials = [TrialOptions(robot=robot) for robot in robots_of_the_line()]
+        trials += [TrialOptions(robot=robot, inference=PLANE, seconds=30.0) for robot in walking_robots()]
+        for path in (path for trial in trials for path in self._files(trial.robot)):
             check_output(path, "--out")
-        for robot in robots_with_tracker():
-            self._show(TrialOptions(robot=robot).load(), console)
+        for trial in trials:
+            self._show(trial.load(), console)
 
     def _files(self, robot: str) -> list[Path]:
         return [self.out / f"{robot}{ending}" for ending in (".json", ".png", ".mp4", "-episode.png")]
 
     def _show(self, trial: Trial, console: Console) -> None:
         specs = hidden_tasks(trial)
-        with console.status(f"{3 * len(specs)} episodes of 20 s on the {trial.robot_name}"):
+        with console.status(f"{3 * len(specs)} episodes of {trial.seconds:g} s on the {trial.robot_name}"):
             yardsticks = take_yardsticks(trial, specs, 1)
             reuse, oracle, idle = (
                 evaluate(replace(trial, agent=agent), specs, 1, yardsticks) for agent in ("reuse", "oracle", "idle")
             )
-        console.print(_table(reuse, oracle, idle))
+        console.print(_table(reuse, oracle, idle, trial.seconds))
         console.print(summary_table([reuse, oracle, idle]))
         json, picture, video, figure = self._files(trial.robot_name)
         save_results(reuse, json)
@@ -76,33 +76,27 @@ class Demo:
         console.print("written: " + ", ".join(map(str, written)) + "\n", highlight=False)
 
 
-def robots_with_tracker() -> list[str]:
-    """Robots of the line whose tracker ships."""
-    trackers = {name for name, kind in shipped_artifacts() if kind == "tracker"}
-    return [robot for robot in shipped_robots() if f"tracker-{robot}" in trackers]
+def robots_of_the_line() -> list[str]:
+    """Robots whose tracker ships and that walk by nothing else."""
+    return [robot for robot in _with_tracker() if load_robot(robot).walking is None]
 
 
-def hidden_tasks(trial: Trial) -> list[TaskSpec]:
-    """Goals and speeds, front and back, that the robot can reach in 20 s."""
-    assert trial.robot is not None
-    speeds = dict(trial.robot.reach)["velocity"]
-    (slowest,), (fastest,) = speeds.low, speeds.high
-    goals = [round(float(sign * goal), 2) for sign in (-1, 1) for goal in HIDDEN_GOALS]
-    both_ways = np.concatenate([np.linspace(-SLOWEST, slowest, SPEEDS), np.linspace(SLOWEST, fastest, SPEEDS)])
-    tasks = [TaskSpec("goal", (goal,)) for goal in goals]
-    return tasks + [TaskSpec("velocity", (round(float(speed), 2),)) for speed in both_ways]
+def walking_robots() -> list[str]:
+    """Robots that walk by a policy which ships."""
+    return [robot for robot in _with_tracker() if load_robot(robot).walking is not None]
 
 
-def shown_task(trial: Trial) -> TaskSpec:
-    """Run forward, then go back to where it began."""
-    assert trial.robot is not None
-    speed = round(0.6 * dict(trial.robot.reach)["velocity"].high[0], 2)
-    return TaskSpec("velocity", (speed,), Switch(at_s=CHANGE_S, family="goal", target=(2.0,)))
+def _with_tracker() -> list[str]:
+    shipped = {name for name, _ in shipped_artifacts()}
+    return [robot for robot in shipped_robots() if f"tracker-{robot}" in shipped]
 
 
-def _table(reuse: Results, oracle: Results, idle: Results) -> Table:
+def _table(reuse: Results, oracle: Results, idle: Results, seconds: float) -> Table:
     """Each hidden task with three final errors."""
-    table = Table(title=f"final error on the {reuse.robot}, 20 s", caption="idle: what a robot without inference gets")
+    table = Table(
+        title=f"final error on the {reuse.robot}, {reuse.seconds:g} s",
+        caption="idle: what a robot without inference gets",
+    )
     for column in ("hidden task", "read from the belief", "reuse", "oracle", "idle"):
         table.add_column(column, justify="right")
     for found, told, still in zip(reuse.episodes, oracle.episodes, idle.episodes, strict=True):
