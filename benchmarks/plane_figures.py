@@ -118,12 +118,13 @@ def draw_one_sharpened(module: Inference, outcome: Outcome, path: Path) -> None:
     heard, guess, hypotheses = retold(sharp, which, states, jnp.asarray(outcome.episodes.reward[:early, own]))
     steps = metres(expert, steps_from(heard, guess))
     known = metres(expert, hypotheses.amounts)
-    time, one = most_in_doubt(np.asarray(hypotheses.cost), known, steps, target)
+    moved = np.stack([np.asarray(states.x), np.asarray(states.y)], axis=-1)
+    time, one = most_in_doubt(np.asarray(hypotheses.cost), known, steps, moved, target)
     shown = steps[:, time, one], known[time, one, 1], target[one]
     places, nats = likelihood(taken(heard, time, one), np.concatenate([np.zeros((1, 2)), *map(np.atleast_2d, shown)]))
-    moved = np.stack([np.r_[0.0, np.asarray(each)[: time + 1, one]] for each in (states.x, states.y)], axis=-1)
+    walked = np.concatenate([np.zeros((1, 2)), moved[: time + 1, one]])
     with figure(path, 1, 1, size=(7.2, 5.6)) as (drawing, (panel,)):
-        image = draw_sharpening(panel, places, nats, moved, *shown)
+        image = draw_sharpening(panel, places, nats, walked, *shown)
         panel.set_title(f"after {time + 1} decisions ({(time + 1) / 10:g} s)")
         bar = drawing.colorbar(image, ax=panel, extend="max", label="rewards off by [standard deviations]")
         bar.ax.set_ylim(0, FAINTEST)
@@ -153,14 +154,19 @@ def retold(sharp: Sharpened, which: int, states: GlobalState, rewards: jax.Array
     return Heard(expert, *heard), guess, hypotheses
 
 
-def most_in_doubt(cost: np.ndarray, known: np.ndarray, steps: np.ndarray, target: np.ndarray) -> tuple[int, int]:
+def most_in_doubt(
+    cost: np.ndarray, known: np.ndarray, steps: np.ndarray, moved: np.ndarray, target: np.ndarray
+) -> tuple[int, int]:
     """Decision and episode: by costs [time, episode, 2] and places [time, episode, 2, 2] of hypotheses, steps
-    [step, time, episode, 2], and true places [episode, 2]."""
+    [step, time, episode, 2], where bodies are [time, episode, 2], and true places [episode, 2]."""
     suits = np.isfinite(cost).all(axis=-1) & (np.abs(known) < EDGE_M).all(axis=(-1, -2))
     for each in (steps[-1], known[..., 0, :]):
         suits &= np.linalg.norm(each - target, axis=-1) < NEAR_M
     suits &= np.linalg.norm(steps[0] - target, axis=-1) > FAR_M
     suits &= np.linalg.norm(known[..., 0, :] - known[..., 1, :], axis=-1) > APART_M
+    # the body has gone by between the two: they are mirror images about its way, or nearly
+    across = moved[..., None, 0] * known[..., 1] - moved[..., None, 1] * known[..., 0]
+    suits &= across[..., 0] * across[..., 1] < 0
     suits[: EARLY.start - 1] = False
     if not suits.any():
         raise RebodyError("no early belief is in doubt between two places: give more --tasks.")

@@ -9,12 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
 
 from rebody.agents.belief import Reading
+from rebody.report.ellipse import STDS
 from rebody.report.plane import AT, ellipse_of
 from rebody.report.style import BELIEF, MOTION, TRUTH
 from rebody.types import DECISION_DT
 
 EDGE_M = 20.0
 """Largest coordinate that is shown beside its true one; what is beyond lies at the edge."""
+LARGEST_M = 6.0
+"""Of an ellipse that a map has room for: how far it reaches."""
 RIGHT, OTHER = {"color": BELIEF, "ms": 3, "alpha": 0.7}, {"color": "0.45", "ms": 4, "mfc": "none", "mew": 0.8}
 TRUE_R, BELIEVED_R = 1.0, 0.62
 """Radii of the circles of true and of believed headings."""
@@ -39,10 +42,12 @@ def draw_path(
         if readings[i].family == family:
             axes.plot(*readings[i].target, "+", color=colour, ms=9, mew=2)
             axes.add_artist(ellipse_of(readings[i], colour))
-            shown.append(np.clip(readings[i].target, -EDGE_M, EDGE_M))
+            reach = STDS * np.sqrt(np.diag(readings[i].covariance))
+            reach = reach if reach.max() < LARGEST_M else 0.0
+            shown += [np.clip(np.array(readings[i].target) + side * reach, -EDGE_M, EDGE_M) for side in (-1, 1)]
     axes.plot(*target, "x", color=TRUTH, ms=10, mew=2, label="hidden place")
     low, high = np.min(shown, axis=0), np.max(shown, axis=0)
-    half, middle = 0.65 * float((high - low).max()), (low + high) / 2
+    half, middle = 0.6 * float((high - low).max()), (low + high) / 2
     axes.set(xlim=middle[0] + np.array([-half, half]), ylim=middle[1] + np.array([-half, half]), aspect="equal")
     axes.set(xlabel="x [m]", ylabel="y [m]")
 
