@@ -21,7 +21,7 @@ LARGEST_M = 6.0
 RIGHT, OTHER = {"color": BELIEF, "ms": 3, "alpha": 0.7}, {"color": "0.45", "ms": 4, "mfc": "none", "mew": 0.8}
 TRUE_R, BELIEVED_R = 1.0, 0.62
 """Radii of the circles of true and of believed headings."""
-FAINTEST, DARKEST = 15.0, -5.0
+FAINTEST, DARKEST = 12.0, -3.0
 """Standard deviations that the rewards lie off, from which on a map is white; and where it would be black."""
 
 
