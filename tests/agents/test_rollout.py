@@ -295,3 +295,11 @@ def test_pitch_and_height_do_not_reach_the_belief(agent):
         return carry.belief
 
     assert_same(belief(still), belief(np.sin(20 * x)), rtol=0, atol=0)
+
+
+def test_a_toy_begins_where_it_is_told(inference, families):
+    idle = build_agent("idle", inference)
+    start = global_state(x=np.array([4.0, -2.0], np.float32))
+    moved = rollout_on_toy(idle, inference.toy, lasting(3.0, 3.0), families, start=start)
+    np.testing.assert_allclose(moved.state.x[-1], start.x, atol=1e-5)
+    np.testing.assert_allclose(rollout_on_toy(idle, inference.toy, lasting(3.0), families).state.x, 0.0, atol=1e-5)

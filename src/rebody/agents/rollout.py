@@ -40,13 +40,15 @@ def rollout_on_toy(
     families: FamilySet,
     disturbance: Disturbance | None = None,
     reward_noise: float = 0.0,
+    start: GlobalState | None = None,
 ) -> Episodes:
-    """Episodes on a toy at home and at rest; `tasks` are the active ones, [time, episode], of `families`.
+    """Episodes on a toy at home and at rest, or from `start` [episode]; `tasks` are the active ones, [time, episode],
+    of `families`.
 
     `reward_noise` is the standard deviation of what the agent hears around what is earned, in the reward's unit.
     """
     still = jnp.zeros(tasks.family.shape[1])
-    body = toy.begin(global_state(x=still), disturbance)
+    body = toy.begin(global_state(x=still) if start is None else start, disturbance)
     carry, command = agent.begin(toy.observe(body))
 
     def advance(walk, inputs):

@@ -72,7 +72,7 @@ def surprise(
     return (reward - expert(state, amount)) / (FLOOR + RELATIVE * jnp.abs(reward))
 
 
-def refine(heard: Heard, start: Float[AnyArray, " amount"], known: Known) -> Refined:
+def refine(heard: Heard, start: Float[AnyArray, " amount"], known: Known, steps: int = STEPS) -> Refined:
     """Levenberg-Marquardt from a start, a fixed number of steps; it never ends anywhere worse."""
 
     size = start.shape[-1]
@@ -81,7 +81,7 @@ def refine(heard: Heard, start: Float[AnyArray, " amount"], known: Known) -> Ref
         window = jnp.where(heard.is_heard, surprise(heard.expert, heard.states, heard.rewards, amount[None]), 0.0)
         return jnp.concatenate([window, known.root @ amount - known.aim, known.precision * (amount - known.guess)])
 
-    amount, cost, slope = levenberg_marquardt(unexplained, start, STEPS)
+    amount, cost, slope = levenberg_marquardt(unexplained, start, steps)
     window = len(heard.rewards)
     rows = jnp.arange(len(slope)) < window + size
     noise = jnp.where(rows, _noise(unexplained(amount)[:window], jnp.sum(heard.is_heard) - size), 1.0)

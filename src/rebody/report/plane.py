@@ -120,14 +120,14 @@ def draw_ellipses(axes: Axes, readings: Sequence[Reading], chosen: Sequence[int]
     """Two standard deviations of believed targets of two numbers, those chosen at some decisions."""
     for i in at:
         if i in chosen:
-            axes.add_artist(_ellipse(readings[i]))
+            axes.add_artist(ellipse_of(readings[i]))
 
 
-def _ellipse(reading: Reading) -> Ellipse:
+def ellipse_of(reading: Reading, colour: Any = BELIEF) -> Ellipse:
     """Two standard deviations of a target of two numbers."""
     first, second, angle = outline(reading.covariance)
     x, y = reading.target
-    return Ellipse((x, y), 2 * first, 2 * second, angle=np.degrees(angle), fill=False, edgecolor=BELIEF, lw=1.0)
+    return Ellipse((x, y), 2 * first, 2 * second, angle=np.degrees(angle), fill=False, edgecolor=colour, lw=1.0)
 
 
 def _target(

@@ -103,7 +103,7 @@ def said(outcome, changes):
 
 
 def test_decisions_until_a_new_base_task_is_read(changing):
-    figures = measure._changes(PROBE, changing)
+    figures = measure.changes(PROBE, changing)
     assert figures["decisions to a new base task"] == LATE  # rewards of the new task that were heard
     assert figures["false changes in 1000"] == 0.0  # the change itself is none
 
@@ -111,7 +111,7 @@ def test_decisions_until_a_new_base_task_is_read(changing):
 def test_a_right_reading_that_is_lost_is_a_false_change(changing):
     """Two of 100 pairs of decisions, one of them twice as long: a loss counts once."""
     lost = said(changing, [(10, 0), (40, 1), (41, 1)])
-    figures = measure._changes(PROBE, lost)
+    figures = measure.changes(PROBE, lost)
     assert figures["false changes in 1000"] == pytest.approx(1000 * 2 / 100)
     assert figures["decisions to a new base task"] == LATE
 
@@ -119,7 +119,7 @@ def test_a_right_reading_that_is_lost_is_a_false_change(changing):
 def test_what_is_not_right_yet_cannot_be_lost(changing):
     """Wrong from the start on, and wrong again right after the change."""
     wrong = said(changing, [(0, 0), (1, 0), (CHANGES_AT, 0), (CHANGES_AT + 1, 0)])
-    assert measure._changes(PROBE, wrong) == {"decisions to a new base task": LATE, "false changes in 1000": 0.0}
+    assert measure.changes(PROBE, wrong) == {"decisions to a new base task": LATE, "false changes in 1000": 0.0}
 
 
 def test_the_median_is_over_changes(changing):
@@ -128,7 +128,7 @@ def test_the_median_is_over_changes(changing):
     new = latent_of(changing.tasks.family, changing.tasks.target)
     latent[CHANGES_AT:, 0] = new[CHANGES_AT:, 0]
     latent[CHANGES_AT : CHANGES_AT + 9, 1] = latent[0, 1]
-    figures = measure._changes(PROBE, outcome_of(changing.tasks, latent))
+    figures = measure.changes(PROBE, outcome_of(changing.tasks, latent))
     assert figures["decisions to a new base task"] == (1 + 10) / 2
 
 
@@ -136,7 +136,7 @@ def test_another_target_of_the_same_base_task_is_no_new_one(changing):
     tasks = changing.tasks
     farther = Task(tasks.family, np.where(np.arange(51)[:, None, None] > 35, 1.5 * tasks.target, tasks.target))
     latent = changing.episodes.belief.mean
-    assert measure._changes(PROBE, outcome_of(farther, latent)) == measure._changes(PROBE, changing)
+    assert measure.changes(PROBE, outcome_of(farther, latent)) == measure.changes(PROBE, changing)
 
 
 TIME = 60

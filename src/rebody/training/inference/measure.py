@@ -7,6 +7,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from rebody.agents.agent import Reader
 from rebody.agents.build import build_agent
 from rebody.agents.parts import Inference, InferenceParts
 from rebody.agents.rollout import Episodes, rollout_on_toy
@@ -76,7 +77,7 @@ def measure_in_depth(parts: InferenceParts, toy: Toy, config: MetaConfig, held_o
     figures |= _readings(probe, outcome)
     figures |= _sharpness(probe, act("reuse", parts, toy, config, held_out, disturbed=True))
     figures |= _coverage(parts, toy, config, held_out)
-    figures |= _changes(probe, act("reuse", parts, toy, config, held_out, switch_share=1.0))
+    figures |= changes(probe, act("reuse", parts, toy, config, held_out, switch_share=1.0))
     return figures | (_clusters(outcome, config) if config.prior == "mixture" else {})
 
 
@@ -141,7 +142,7 @@ def probe_of(families: FamilySet, tasks: Task, episodes: Episodes) -> Probe:
     return fit_probe(families, latent.reshape(-1, latent.shape[-1]), family.ravel(), target.reshape(-1, families.size))
 
 
-def _readings(probe: Probe | PlaceReader, outcome: Outcome) -> dict[str, float]:
+def _readings(probe: Reader, outcome: Outcome) -> dict[str, float]:
     """Share of right base tasks, early and later on, and R^2 of each family's target."""
     right = is_right(probe, outcome)
     figures = {"base task": float(right[BASE_TASK_AT - 1].mean()), "base task later": float(right[PROBED_FROM:].mean())}
@@ -151,7 +152,7 @@ def _readings(probe: Probe | PlaceReader, outcome: Outcome) -> dict[str, float]:
     return figures
 
 
-def _sharpness(probe: Probe | PlaceReader, outcome: Outcome) -> dict[str, float]:
+def _sharpness(probe: Reader, outcome: Outcome) -> dict[str, float]:
     """Median distance between the target that a disturbed toy's belief speaks of and the true one."""
     return {
         f"{family.name} read, disturbed": float(np.median(length(missed[SHARP_AT])))
@@ -174,7 +175,7 @@ def _coverage(parts: InferenceParts, toy: Toy, config: MetaConfig, held_out: int
     return figures
 
 
-def _changes(probe: Probe | PlaceReader, outcome: Outcome) -> dict[str, float]:
+def changes(probe: Reader, outcome: Outcome) -> dict[str, float]:
     """Decisions until a new base task is read rightly (median; all that are left, where it never is), and how often a
     right reading is lost again."""
     label = outcome.families.base_task(outcome.tasks)
@@ -210,20 +211,20 @@ def _clusters(outcome: Outcome, config: MetaConfig) -> dict[str, float]:
 
 
 def read(
-    probe: Probe | PlaceReader, outcome: Outcome
+    probe: Reader, outcome: Outcome
 ) -> tuple[Int[np.ndarray, "time episode"], Float[np.ndarray, "time episode axis"]]:
     """Family and target that each belief speaks of."""
     family, target = probe(outcome.episodes.belief)
     return np.asarray(family), np.asarray(target)
 
 
-def is_right(probe: Probe | PlaceReader, outcome: Outcome) -> Bool[np.ndarray, "time episode"]:
+def is_right(probe: Reader, outcome: Outcome) -> Bool[np.ndarray, "time episode"]:
     """Whether family and direction are read rightly from each belief."""
     base_task = outcome.families.base_task
     return np.asarray(base_task(Task(*read(probe, outcome))) == base_task(outcome.tasks))
 
 
-def _by_family(probe: Probe | PlaceReader, outcome: Outcome) -> Iterator[tuple[Family, Series, Series]]:
+def _by_family(probe: Reader, outcome: Outcome) -> Iterator[tuple[Family, Series, Series]]:
     """Of each family: what its episodes' targets are read wrongly by, and the targets, [time, episode, size]."""
     _, target = read(probe, outcome)
     for i, family in enumerate(outcome.families):
