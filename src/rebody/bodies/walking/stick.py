@@ -103,7 +103,7 @@ def fastest_stick(spec: RobotSpec, followers: Followers, at_once: float) -> floa
             wanted = np.tile(jump, (len(RATES), 1))  # the same for each rate
         held = held + np.clip(wanted - held, -farthest, farthest)
         batch.follow(stick.command(held))
-        fell |= batch.fallen
+        fell[batch.fallen] = True
     return _last_good(RATES, ~fell.reshape(len(RATES), SHAKEN).any(axis=1))
 
 
