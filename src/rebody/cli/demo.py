@@ -94,7 +94,7 @@ def _with_tracker() -> list[str]:
 def _table(reuse: Results, oracle: Results, idle: Results, seconds: float) -> Table:
     """Each hidden task with three final errors."""
     table = Table(
-        title=f"final error on the {reuse.robot}, {reuse.seconds:g} s",
+        title=f"final error on the {reuse.robot}, {seconds:g} s",
         caption="idle: what a robot without inference gets",
     )
     for column in ("hidden task", "read from the belief", "reuse", "oracle", "idle"):
