@@ -103,8 +103,8 @@ def fastest_stick(spec: RobotSpec, followers: Followers, at_once: float) -> floa
             wanted = np.tile(jump, (len(RATES), 1))  # the same for each rate
         held = held + np.clip(wanted - held, -farthest, farthest)
         batch.follow(stick.command(held))
-        fell |= batch.fallen
-    return _last_good(RATES, ~fell.reshape(len(RATES), SHAKEN).any(axis=1))
+        fell[batch.fallen] = True
+    return _last_good(RATES, np.asarray(~fell.reshape(len(RATES), SHAKEN).any(axis=1)))
 
 
 def _last_good(tried: tuple[float, ...], is_good: np.ndarray) -> float:
