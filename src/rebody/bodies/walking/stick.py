@@ -104,8 +104,7 @@ def fastest_stick(spec: RobotSpec, followers: Followers, at_once: float) -> floa
         held = held + np.clip(wanted - held, -farthest, farthest)
         batch.follow(stick.command(held))
         fell[batch.fallen] = True
-    stood = ~fell.reshape(len(RATES), SHAKEN)
-    return _last_good(RATES, np.all(stood, axis=1, keepdims=True)[:, 0])
+    return _last_good(RATES, np.asarray(~fell.reshape(len(RATES), SHAKEN).any(axis=1)))
 
 
 def _last_good(tried: tuple[float, ...], is_good: np.ndarray) -> float:
