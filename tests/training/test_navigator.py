@@ -12,7 +12,7 @@ from rebody.bodies.walking import toy
 from rebody.bodies.walking.joystick import Measured
 from rebody.control.command import relative
 from rebody.training.navigator import NavigatorConfig, train_navigator
-from rebody.training.navigator.time_to_go import time_to_go
+from rebody.training.navigator.to_go import error_to_go, time_to_go
 from rebody.training.navigator.train import HEADINGS, NAVIGATED, PLACES, VELOCITIES, drive, initial_state, learn
 from rebody.types import POSE_FIELDS, Subgoal
 
@@ -91,6 +91,14 @@ def test_turning_first_pays_for_a_far_place_behind_a_slow_walker_alone():
     robot = walker(4)
     places = jnp.asarray([(2.0, 0.0), (-0.6, 0.0), (-12.0, 0.0), (0.0, 0.4)])
     np.testing.assert_allclose(time_to_go(robot, places), [2.0, 1.0, np.pi + 12.0, 1.0], rtol=1e-3)
+
+
+def test_turning_first_pays_for_a_velocity_that_cannot_be_had_as_the_robot_stands():
+    """Ahead at 1 m/s, backwards at 0.6; both at once only to half; a turn of a quarter takes pi / 2 s."""
+    velocities = jnp.asarray([(0.9, 0.0), (-0.5, 0.0), (0.0, 0.8), (0.5, 0.4)])
+    np.testing.assert_allclose(error_to_go(walker(4), velocities), [0.0, 0.0, 0.4 * np.pi, 0.0], atol=2e-3)
+    narrow = np.asarray(error_to_go(walker(4, at_once=1.0), velocities))
+    np.testing.assert_allclose(narrow[3], np.hypot(0.5, 0.4) * np.arctan2(0.4, 0.5), rtol=1e-2)
 
 
 @pytest.mark.parametrize(

@@ -24,8 +24,9 @@ class NavigatorConfig:
     """Share of the places that are asked for within half a metre, and of headings within half a radian."""
     far: Positive = 10.0
     """Farthest place [m]. It is shown nearer, as an agent shows it."""
-    time_price: NotNegative = 1.0
-    """Of a second that the robot will still need to a place at the end of its course."""
+    to_go_price: NotNegative = 1.0
+    """Of what a subgoal will still cost at the end of a course: of a second to a place, of a metre that a velocity is
+    missed by."""
     speed_price: NotNegative = 0.05
     """Of m/s while a heading is asked for: who turns stays where it is."""
     change_price: NotNegative = 0.1

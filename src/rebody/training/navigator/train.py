@@ -28,7 +28,7 @@ from rebody.tasks.plane import HEADING, PLACE, VELOCITY_XY
 from rebody.training.card import save
 from rebody.training.descent import descend
 from rebody.training.navigator.config import NavigatorConfig
-from rebody.training.navigator.time_to_go import time_to_go
+from rebody.training.navigator.to_go import error_to_go, time_to_go
 from rebody.training.run import Metrics, Run
 from rebody.types import DECISION_DT, POSE_FIELDS, AnyArray, Subgoal
 
@@ -99,7 +99,7 @@ def learn(state: RunState, config: NavigatorConfig, key: PRNGKeyArray):
         told, course, to_go = drive(actor, config, config.courses, key)
         price = course.left + config.change_price * course.change + config.effort_price * course.effort
         price = price + config.speed_price * jnp.where(told.slot == HEADINGS, course.speed, 0.0)
-        return jnp.mean(price) + config.time_price * jnp.mean(to_go), {"left": jnp.mean(course.left)}
+        return jnp.mean(price) + config.to_go_price * jnp.mean(to_go), {"left": jnp.mean(course.left)}
 
     keys = jax.random.split(key, config.updates)
     return descend(state.actor, state.optimiser, _optimiser(config), loss, keys)
@@ -108,8 +108,8 @@ def learn(state: RunState, config: NavigatorConfig, key: PRNGKeyArray):
 def drive(
     actor: Actor, config: NavigatorConfig, size: int, key: PRNGKeyArray
 ) -> tuple[Subgoal, Course, Float[AnyArray, " course"]]:
-    """Robots, half of them at rest, that are told one thing each, what they make of it, and what time they will need
-    still [s]."""
+    """Robots, half of them at rest, that are told one thing each, what they make of it, and what it will still cost
+    them [s, m]."""
     walker_key, told_key, ahead_key, moves_key = jax.random.split(key, 4)
     walker, told = config.walkers.sample(walker_key, size), subgoals(config, size, told_key)
     ahead = NAVIGATED_M * jax.random.uniform(ahead_key, (size,), minval=0.5)
@@ -133,9 +133,9 @@ def drive(
     moves = jnp.abs(share) * jnp.where(share > 0, walker.measured.high, walker.measured.low)
     begun = toy.begin(still, still, still, moves), jnp.zeros((size, len(WAYS)))
     (ended, _), course = jax.lax.scan(step, begun, None, length=config.decisions)
-    is_place = told.slot == PLACES
-    place = jnp.where(is_place[:, None], command(ended).value, 1.0)  # the bearing of nothing has no slope
-    return told, course, jnp.where(is_place, time_to_go(walker, place), 0.0)
+    asked = jnp.where((told.slot == HEADINGS)[:, None], 1.0, command(ended).value)  # the bearing of 0 has no slope
+    to_go = [time_to_go(walker, asked), error_to_go(walker, asked), jnp.zeros(size)]
+    return told, course, jnp.select([told.slot == i for i in (PLACES, VELOCITIES, HEADINGS)], to_go)
 
 
 def subgoals(config: NavigatorConfig, size: int, key: PRNGKeyArray) -> Subgoal:

@@ -1,4 +1,4 @@
-"""How long a robot will need to a place: what is left at the end of a course that is too short to turn round and walk.
+"""What a subgoal will still cost at the end of a course that is too short to turn round and walk.
 
 Whoever sees 2.4 s ahead walks backwards to a place behind it, be it ever so slow. This says that turning pays.
 """
@@ -11,6 +11,8 @@ from rebody.types import AnyArray
 
 SLOWEST = 0.05
 """Taken for the speed of a way that a robot does not go [m/s, rad/s]."""
+LASTS_S = 10.0
+"""How long a velocity is wanted for [s]."""
 
 
 def time_to_go(walker: Walker, place: Float[AnyArray, "*batch 2"]) -> Float[AnyArray, "*batch"]:
@@ -23,6 +25,18 @@ def time_to_go(walker: Walker, place: Float[AnyArray, "*batch 2"]) -> Float[AnyA
     distance = jnp.sqrt(ahead**2 + left**2 + 1e-6)
     turned_first = jnp.abs(jnp.arctan2(left, ahead)) / turn + distance / straight
     return jnp.minimum(as_it_stands, turned_first)
+
+
+def error_to_go(walker: Walker, velocity: Float[AnyArray, "*batch 2"]) -> Float[AnyArray, "*batch"]:
+    """What a velocity ahead and to the left [m/s] will be missed by, over time [m]: for `LASTS_S` by as much as the
+    robot cannot go as it stands, or by all of it until it has turned that way, whichever is less."""
+    ahead, left = jnp.moveaxis(velocity, -1, 0)
+    forward, sideways, turn = _fastest(walker, ahead, left)
+    shares = jnp.stack([jnp.abs(ahead) / forward, jnp.abs(left) / sideways])
+    share = jnp.maximum(shares.max(axis=0), shares.sum(axis=0) / walker.measured.at_once[..., 0])
+    speed = jnp.sqrt(ahead**2 + left**2 + 1e-6)
+    as_it_stands = LASTS_S * speed * (1 - 1 / jnp.maximum(share, 1.0))
+    return jnp.minimum(as_it_stands, speed * jnp.abs(jnp.arctan2(left, ahead)) / turn)
 
 
 def _fastest(walker: Walker, ahead: Float[AnyArray, "*batch"], left: Float[AnyArray, "*batch"]):
