@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rebody.cli.main import run
@@ -56,7 +57,9 @@ def test_the_shipped_module_finds_hidden_goals_on_the_point_mass(tasks: Path, tm
     episodes = json.loads(out.read_text())["episodes"]
     assert max(episode["final_error"] for episode in episodes) < 0.15
     assert all(abs(episode["inferred_target"][-1][0] - episode["target"][0]) < 0.15 for episode in episodes)
-    assert all(episode["oracle_return"] > episode["return"] for episode in episodes)
+    returns, oracles = (np.array([episode[key] for episode in episodes]) for key in ("return", "oracle_return"))
+    assert (oracles > 1.02 * returns).all()  # who is told is not behind, but for how it arrives
+    assert oracles.mean() > returns.mean()
 
 
 def test_run_draws_an_episode(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

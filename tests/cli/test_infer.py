@@ -51,7 +51,9 @@ def test_of_an_evaluation_it_says_what_the_agent_believed(own_module, tmp_path):
     rows = rows_of(out / "belief.csv")
     assert [row["inferred_family"] for row in rows] == episode["inferred_family"]
     inferred = [float(row["inferred_target"]) for row in rows]
-    assert inferred == pytest.approx([target for (target,) in episode["inferred_target"]], abs=0.05)
+    # decimals of the file: while little is known, a thousandth of a reward is some centimetres
+    assert inferred == pytest.approx([target for (target,) in episode["inferred_target"]], abs=0.15)
+    assert inferred[10:] == pytest.approx([target for (target,) in episode["inferred_target"][10:]], abs=0.05)
 
 
 def test_without_a_folder_it_only_says(tmp_path, capsys, monkeypatch):
