@@ -8,6 +8,7 @@ import tyro
 from rich.console import Console
 
 from rebody.bodies.walking.export import export_onnx
+from rebody.bodies.walking.joystick import WAYS
 from rebody.bodies.walking.trained import TrainedPolicy, WalkingSettings
 from rebody.cli.output import check_output
 
@@ -33,7 +34,7 @@ class Export:
 
 def _table(path: Path, settings: WalkingSettings) -> str:
     """Of a description: all that the file does not say itself."""
-    limits = zip(("forward", "sideways", "turn"), settings.low, settings.high, strict=True)
+    limits = zip(WAYS, settings.low, settings.high, strict=True)
     ways = "\n".join(f"{way} = [{low:g}, {high:g}]" for way, low, high in limits)
     slow = "\n".join(f"{name} = {list(getattr(settings, name))}" for name in ("dead", "drift"))
     stick = f"at_once = {settings.at_once:g}\nrate = {settings.joystick.rate:g}"

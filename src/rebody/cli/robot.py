@@ -13,11 +13,12 @@ from rich.table import Table
 
 from rebody.bodies import load_robot
 from rebody.bodies.check import check_robot
+from rebody.bodies.walking.joystick import UNITS
 from rebody.bodies.walking.measure import STANDS, WalkingMeasured, measure_walking
 from rebody.bodies.walking.policy import has_policy
 from rebody.cli.output import PICTURES, check_output
 from rebody.errors import RebodyError
-from rebody.report.walking import UNITS, plot_walking
+from rebody.report.walking import plot_walking
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rebody.bodies.walking.joystick import UNITS
 from rebody.bodies.walking.measure import WalkingMeasured
 from rebody.report.style import BELIEF, MOTION, as_text, figure
-
-UNITS = ("m/s", "m/s", "rad/s")
 
 
 def plot_walking(measured: WalkingMeasured, robot: str, path: Path) -> None:

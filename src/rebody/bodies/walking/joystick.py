@@ -9,16 +9,30 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from rebody.bodies.attitude import in_heading, wrap_angle
 from rebody.ranges import Box
-from rebody.types import GlobalState
+from rebody.types import POSE_FIELDS, GlobalState
+
+YAW = POSE_FIELDS.index("yaw")
 
 WAYS = ("forward", "sideways", "turn")
+UNITS = ("m/s", "m/s", "rad/s")
 NAVIGATOR_SEES = 16
 """Numbers of `navigator_sees`."""
 NAVIGATED_M = 3.0
 """How far ahead a navigator is shown a place [m]."""
 REST = 0.05
 """Actions below this are none: the stick is let go."""
+
+
+def ways_between(
+    before: Float[np.ndarray, "robot 6"], now: Float[np.ndarray, "robot 6"]
+) -> Float[np.ndarray, "robot 3"]:
+    """How far robots got ahead and to the left, and turned, from one pose to the next [m, m, rad]; in the frame of the
+    heading before.
+    """
+    moved = in_heading(now[:, :2] - before[:, :2], before[:, YAW])
+    return np.column_stack([moved, wrap_angle(now[:, YAW] - before[:, YAW])])
 
 
 class Measured(NamedTuple):

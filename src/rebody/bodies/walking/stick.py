@@ -8,9 +8,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float
 
-from rebody.bodies.attitude import in_heading, wrap_angle
 from rebody.bodies.robot import RobotSpec
-from rebody.bodies.walking.joystick import WAYS
+from rebody.bodies.walking.joystick import WAYS, ways_between
 
 SETTLES_S, LASTS_S = 2.0, 4.0
 """Speeds are read from the first on, for as long as the second [s]."""
@@ -65,8 +64,7 @@ def walk(
     for _ in range(round((SETTLES_S + LASTS_S) / dt)):
         batch.follow(command)
         now = batch.pose()
-        moved = in_heading(now[:, :2] - before[:, :2], before[:, 5])
-        speeds.append(np.column_stack([moved, wrap_angle(now[:, 5] - before[:, 5])]) / dt)
+        speeds.append(ways_between(before, now) / dt)
         fell, before = fell | batch.fallen, now
     return np.array(speeds), fell
 

@@ -7,10 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from rebody.bodies import RobotSpec
-from rebody.bodies.attitude import in_heading, wrap_angle
-from rebody.bodies.walking.joystick import WAYS
+from rebody.bodies.walking.joystick import WAYS, ways_between
 from rebody.bodies.walking.stick import SETTLES_S
-from rebody.control.command import YAW
 from rebody.control.sac import Actor
 from rebody.ranges import Box
 from rebody.training.walking.follower import ActorFollower
@@ -45,8 +43,7 @@ def walk(
         batch.follow(command)
         now = batch.pose()
         if step >= settles:
-            moved = in_heading(now[:, :2] - before[:, :2], before[:, YAW])
-            total += np.column_stack([moved, wrap_angle(now[:, YAW] - before[:, YAW])])
+            total += ways_between(before, now)
         before, fell = now, fell | batch.fallen
     away = np.linalg.norm(now[:, :2] - begun[:, :2], axis=-1)
     return Walk(total / ((steps - settles) * batch.step_s), away, fell)

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from rebody.bodies import RobotSpec
+from rebody.bodies.walking.batch import joint_interface
 from rebody.bodies.walking.joints import JointInterface
-from rebody.bodies.walking.joystick import WAYS
+from rebody.bodies.walking.joystick import UNITS, WAYS
 from rebody.bodies.walking.measure import WalkingMeasured, measure_walking
 from rebody.bodies.walking.trained import KIND, Three, WalkingSettings
 from rebody.control.sac import Actor
@@ -21,15 +22,13 @@ from rebody.training.walking.follower import ActorFollower
 from rebody.training.walking.measure import PUSH, PUSH_EVERY_S, SLOW, measure, slow_error, stand, stressed
 from rebody.training.walking.scales import network_of
 
-UNITS = ("m/s", "m/s", "rad/s")
-
 
 def save_walking(actor: Actor, spec: RobotSpec, config: WalkingConfig, run: Run) -> Path:
     """Measure, write artifact and card."""
     assert spec.walking is not None
     limits = spec.walking.joystick.limits
     ways = measure_walking(spec, lambda size: ActorFollower(spec, size, actor))
-    joints = ActorFollower(spec, 1, actor).joints
+    joints = joint_interface(spec)
     settings = _settings(spec, joints, limits, ways, config, run)
     steps, updates = (run.iterations * each for each in (config.steps * config.robots, config.updates))
     what = (

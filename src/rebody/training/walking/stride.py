@@ -4,9 +4,8 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float
 
-from rebody.bodies.attitude import in_heading, wrap_angle
 from rebody.bodies.walking.batch import JointBatch
-from rebody.control.command import YAW
+from rebody.bodies.walking.joystick import ways_between
 from rebody.types import POSE_FIELDS, AnyArray
 
 CLEARANCE = 0.05
@@ -37,8 +36,7 @@ def stride_of(
     on, in place.
     """
     (before, feet), pose, dt = begun, batch.pose(), batch.step_s
-    moved = in_heading(pose[:, :2] - before[:, :2], before[:, YAW])
-    speed = np.column_stack([moved, wrap_angle(pose[:, YAW] - before[:, YAW])]) / dt
+    speed = ways_between(before, pose) / dt
     mean += min(1.0, dt / max(smoothing_s, dt)) * (speed - mean)
     numbers = (
         0.5 * (speed + mean),

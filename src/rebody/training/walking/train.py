@@ -5,6 +5,7 @@ of it as a mirror shows it, where left and right are alike.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from jaxtyping import Bool, Float, PRNGKeyArray
 
 from rebody.bodies import RobotBatch
 from rebody.bodies.walking.batch import JointBatch, joint_interface
+from rebody.bodies.walking.joints import JointInterface
 from rebody.control.sac import Actor, SACState
 from rebody.jax_settings import own_jax_settings
 from rebody.ranges import Box
@@ -67,6 +69,11 @@ class WalkingLearner(Learner[World]):
     name = "walking"
     config: WalkingConfig
 
+    @cached_property
+    def joints(self) -> JointInterface:
+        """What it hears and moves."""
+        return joint_interface(self.spec)
+
     @property
     def limits(self) -> Box:
         """Commands that it is to follow."""
@@ -79,7 +86,7 @@ class WalkingLearner(Learner[World]):
 
     def sizes(self, batch: RobotBatch) -> tuple[int, int]:
         """What it hears, and its joints."""
-        return joint_interface(self.spec).observations, batch.actions
+        return self.joints.observations, batch.actions
 
     def row(self, batch: RobotBatch) -> ControlSteps:
         """What happened, whatever was commanded."""
@@ -117,7 +124,7 @@ class WalkingLearner(Learner[World]):
     def update(self, policy: SACState, drawn: Any, key: PRNGKeyArray, iteration: int) -> tuple[SACState, dict]:
         """Half of every batch learns under commands that were never given."""
         assert self.spec.walking is not None
-        joints = joint_interface(self.spec)
+        joints = self.joints
         mirror = mirror_of(joints, self.spec.walking.mirror, self.spec.name)
         grown = min(1.0, iteration / max(1, self.config.drag_iterations))
         share = jnp.asarray(grown)  # a number would be compiled anew whenever it changes
@@ -134,7 +141,7 @@ class WalkingLearner(Learner[World]):
 
     def load_actor(self, artifact: str) -> Actor:
         """That of a walking policy."""
-        return loaded_actor(artifact, joint_interface(self.spec), self.config.sac)
+        return loaded_actor(artifact, self.joints, self.config.sac)
 
 
 def renew(world: World, learner: WalkingLearner, rng: np.random.Generator, key: PRNGKeyArray) -> None:
