@@ -1,5 +1,7 @@
 """Ant: go to a place, or in a direction."""
 
+from typing import ClassVar
+
 import numpy as np
 from gymnasium.envs.mujoco.ant_v5 import AntEnv
 
@@ -14,7 +16,7 @@ class AntGoalEnv(HiddenTask, AntEnv):
     """
 
     tasks = places()
-    weights = {"ctrl_cost_weight": 0.1, "terminate_when_unhealthy": False}
+    weights: ClassVar = {"ctrl_cost_weight": 0.1, "terminate_when_unhealthy": False}
 
     def reward_parts(self, x_velocity, action):
         """How far off it is, and both costs."""
@@ -33,7 +35,7 @@ class AntDirEnv(HiddenTask, AntEnv):
     """
 
     tasks = forward_and_backward()
-    weights = {"ctrl_cost_weight": 0.5}
+    weights: ClassVar = {"ctrl_cost_weight": 0.5}
 
     def step(self, action):
         """As Gymnasium's, which tells the reward nothing of the velocity along y."""

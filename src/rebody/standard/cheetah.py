@@ -1,5 +1,7 @@
 """HalfCheetah: run at a speed, or in a direction."""
 
+from typing import ClassVar
+
 import numpy as np
 from gymnasium.envs.mujoco.half_cheetah_v5 import HalfCheetahEnv
 
@@ -11,7 +13,7 @@ class CheetahVelEnv(HiddenTask, HalfCheetahEnv):
     """cheetah-vel of PEARL and VariBAD: -|v - v*| - 0.05 sum a^2; the task is v* in [0, 3] m/s."""
 
     tasks = speeds()
-    weights = {"ctrl_cost_weight": 0.05}
+    weights: ClassVar = {"ctrl_cost_weight": 0.05}
 
     def reward_parts(self, x_velocity, action):
         """How far off the speed is, and the control cost."""

@@ -102,7 +102,8 @@ def _angle(rng: np.random.Generator) -> float:
 
 def _base_task(rng: np.random.Generator) -> tuple[str, float]:
     name = list(BASE_TASKS)[rng.integers(len(BASE_TASKS))]
-    return name, float(rng.uniform(*sorted(BASE_TASKS[name])))
+    low, high = sorted(BASE_TASKS[name])
+    return name, float(rng.uniform(low, high))
 
 
 def _number(asked: Any) -> float:

@@ -16,7 +16,7 @@ from rebody.standard.draws import Target, TaskSet
 SPLITS = ("any", "train", "test")
 
 
-class HiddenTask(MujocoEnv):
+class HiddenTask(MujocoEnv, EzPickle):
     """Goes in front of one of Gymnasium's robots: the physics and the step are theirs, reward and observation are not.
 
     `info` has the task, which the observation does not show, and the parts of the reward as `reward_NAME`.
@@ -36,7 +36,7 @@ class HiddenTask(MujocoEnv):
         super().__init__(**self.weights, **settings)  # pyright: ignore[reportCallIssue]
         EzPickle.__init__(self, split, **settings)
         self.split = split
-        self.task: Target = self.tasks.train[0]
+        self.task: Any = self.tasks.train[0]
         """What is paid for."""
         self.observation_space = spaces.Box(-np.inf, np.inf, self._get_obs().shape, np.float64)
 
@@ -62,6 +62,9 @@ class HiddenTask(MujocoEnv):
         """What the reward of the step just taken is the sum of, by name; `x_velocity` is the displacement over that
         step divided by its time [m/s].
         """
+
+    @abstractmethod
+    def _get_obs(self) -> Float[np.ndarray, " observation"]: ...
 
     def _get_rew(self, x_velocity: float, action: Float[np.ndarray, " action"]) -> tuple[float, dict[str, Any]]:
         # called by Gymnasium's step, which adds the second to `info`

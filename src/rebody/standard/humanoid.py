@@ -1,5 +1,7 @@
 """Humanoid: go in a direction."""
 
+from typing import ClassVar
+
 import numpy as np
 from gymnasium.envs.mujoco.humanoid_v5 import HumanoidEnv, mass_center
 
@@ -15,7 +17,7 @@ class HumanoidDirEnv(HiddenTask, HumanoidEnv):
     """
 
     tasks = angles()
-    weights = {"ctrl_cost_weight": 0.1}
+    weights: ClassVar = {"ctrl_cost_weight": 0.1}
 
     def step(self, action):
         """As Gymnasium's, which tells the reward nothing of the velocity along y."""
