@@ -65,8 +65,6 @@ STANDARD = {
     "melts": Standard("MeltsCheetah", draws.base_tasks(), of_melts, 200),
     "ant-goal": Standard("AntGoal", draws.places(), lambda task: ("place", task), 200, "ant", "plane"),
 }
-
-
 LAST_S = 2.0
 """A final place or attitude is judged over so long."""
 
@@ -87,6 +85,9 @@ def main() -> None:
     parser.add_argument("--inference", help="shipped name or folder (default: goal-velocity, of ant-goal plane)")
     parser.add_argument("--robot", help="name or TOML file (default: cheetah, of ant-goal ant)")
     parser.add_argument("--tasks", type=int, default=40, help="test tasks at most, the first ones")
+    parser.add_argument(
+        "--no-costs", action="store_true", help="agents do not hear costs; returns still have them"
+    )
     parser.add_argument("--json", type=Path, help="file for every episode")
     options = parser.parse_args()
     measured = []
@@ -108,27 +109,30 @@ def measure(name: str, options: argparse.Namespace) -> dict[str, Any]:
         raise RebodyError(f"there is no such benchmark; choose of {', '.join(STANDARD)}.")
     standard = STANDARD[name]
     spec = load_robot(options.robot or standard.robot)
+    tracker = load_tracker(tracker_of(spec))
     trial = Trial(
         agent="reuse",
         inference=load_inference(options.inference or standard.inference),
         families=SHIPPED,
         robot=spec,
-        tracker=load_tracker(tracker_of(spec)),
+        tracker=tracker,
         slots_by="belief",
         sharpen=True,
         seconds=standard.steps * spec.control_dt,
     )
-    known = [task for task in standard.tasks.test if standard.told(task)[0] in trial.inference.contract.families]
+    families = {*trial.contract.families.names} & {*tracker.tracker.families.names}
+    known = [task for task in standard.tasks.test if standard.told(task)[0] in families]
     tasks = known[: options.tasks]
     specs = [TaskSpec(*standard.told(task)) for task in tasks]
     trial = narrowed(trial, specs)
     check_trial(trial, specs)
-    played = {agent: play(standard, replace(trial, agent=agent), tasks, specs) for agent in AGENTS}
+    played = {agent: play(standard, replace(trial, agent=agent), tasks, specs, options.no_costs) for agent in AGENTS}
     return {
         "benchmark": name,
         "environment": standard.environment,
         "robot": spec.name,
         "inference": trial.inference.name,
+        "hears": "the task alone" if options.no_costs else "the reward",
         "robot_steps": {"training": training_steps(spec), "of an episode": standard.steps},
         "left_out": [task for task in standard.tasks.test if task not in known],
         "tasks": tasks,
@@ -144,7 +148,7 @@ def measure(name: str, options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def play(standard: Standard, trial: Trial, tasks: Sequence[Any], specs: list[TaskSpec]) -> Played:
+def play(standard: Standard, trial: Trial, tasks: Sequence[Any], specs: list[TaskSpec], no_costs: bool) -> Played:
     """Two episodes of each task. Between them the robot is put back, and nothing is forgotten: the agent's memory goes
     on, and the jump to the new start counts as a decision in which nothing was heard.
     """
@@ -157,14 +161,15 @@ def play(standard: Standard, trial: Trial, tasks: Sequence[Any], specs: list[Tas
         robots.start(tasks, [EPISODES * i + episode for i in range(len(tasks))])
         state = robots.observe()
         carry, _ = begin(agent, state) if carry is None else pass_over(agent, carry, state)
-        paid, poses = [], [robots.pose()]
+        paid, heard, poses = [], [], [robots.pose()]
         for step in range(1, standard.steps + 1):
             follow(controller, robots, carry.command.subgoal, carry.belief)
             paid.append(robots.rewards)
+            heard.append(robots.task_rewards if no_costs else robots.rewards)
             poses.append(robots.pose())
             if step % per_decision == 0:
-                heard = np.mean(paid[-per_decision:], axis=0, dtype=np.float32)
-                carry, _ = decide(agent, carry, Observation(robots.observe(), heard))
+                mean = np.mean(heard[-per_decision:], axis=0, dtype=np.float32)
+                carry, _ = decide(agent, carry, Observation(robots.observe(), mean))
         returns.append(np.sum(paid, axis=0))
         errors.append(final_errors(standard, specs, np.array(poses), trial.robot.control_dt))
     assert carry is not None
@@ -208,7 +213,7 @@ def training_steps(spec: RobotSpec) -> int:
 
 def print_tables(measured: dict[str, Any]) -> None:
     """In Markdown: a row for each agent and group of tasks."""
-    print(f"\n{measured['benchmark']}: {measured['robot']}, {measured['inference']}\n")
+    print(f"\n{measured['benchmark']}: {measured['robot']}, {measured['inference']}, hears {measured['hears']}\n")
     print("| tasks | agent | return, first episode | second episode | final error, first: median / p95 | second |")
     print("|---|---|---|---|---|---|")
     groups = np.array(measured["groups"])
@@ -225,7 +230,7 @@ def print_tables(measured: dict[str, Any]) -> None:
     print(f"\nRobot steps: {steps['training']:,} in training, {steps['of an episode']:,} in an episode of a test task.")
     if measured["left_out"]:
         names = ", ".join(dict.fromkeys(str(task[0]) for task in measured["left_out"]))
-        print(f"Left out, since the module has no such family: {names}.")
+        print(f"Left out, since module or tracker has no such family: {names}.")
 
 
 def said(returns: Float[np.ndarray, " task"]) -> str:

@@ -25,6 +25,8 @@ class InEnvironments(RobotBatch):
         super().__init__(spec, size, threads=1)
         self.rewards: Float[np.ndarray, " robot"] = np.zeros(size)
         """Of the last control step."""
+        self.task_rewards: Float[np.ndarray, " robot"] = np.zeros(size)
+        """Their parts that are for the task, without costs."""
 
     def start(self, tasks: Sequence[Any], seeds: Sequence[int]) -> None:
         """Begin an episode of each task."""
@@ -35,7 +37,9 @@ class InEnvironments(RobotBatch):
         self._forget(np.arange(self.size))
 
     def _simulate(self):
-        self.rewards = np.array([env.step(ctrl.copy())[1] for env, ctrl in zip(self.envs, self._ctrl, strict=True)])
+        told = [env.step(ctrl.copy()) for env, ctrl in zip(self.envs, self._ctrl, strict=True)]
+        self.rewards = np.array([reward for _, reward, *_ in told])
+        self.task_rewards = np.array([info["reward_task"] for *_, info in told])
         self._read()
 
     def _read(self) -> None:

@@ -37,8 +37,9 @@ def test_they_move_and_are_paid_as_in_the_environment(benchmark):
     for action in np.random.default_rng(0).uniform(-1, 1, (20, 2, 6)):
         x.append(robots.qpos[:, 0].copy())
         robots.step(action)
-        rewards = [env.step(each)[1] for env, each in zip(envs, action, strict=True)]
-        np.testing.assert_array_equal(robots.rewards, rewards)
+        told = [env.step(each) for env, each in zip(envs, action, strict=True)]
+        np.testing.assert_array_equal(robots.rewards, [reward for _, reward, *_ in told])
+        np.testing.assert_array_equal(robots.task_rewards, [info["reward_task"] for *_, info in told])
         np.testing.assert_array_equal(robots.qpos, [env.unwrapped.data.qpos for env in envs])
     assert robots.observe().vx == pytest.approx((robots.qpos[:, 0] - x[-2]) / 0.1, abs=1e-5)
 
