@@ -85,9 +85,7 @@ def main() -> None:
     parser.add_argument("--inference", help="shipped name or folder (default: goal-velocity, of ant-goal plane)")
     parser.add_argument("--robot", help="name or TOML file (default: cheetah, of ant-goal ant)")
     parser.add_argument("--tasks", type=int, default=40, help="test tasks at most, the first ones")
-    parser.add_argument(
-        "--no-costs", action="store_true", help="agents do not hear costs; returns still have them"
-    )
+    parser.add_argument("--no-costs", action="store_true", help="agents do not hear costs; returns still have them")
     parser.add_argument("--json", type=Path, help="file for every episode")
     options = parser.parse_args()
     measured = []
