@@ -92,6 +92,10 @@ class Encoder(eqx.Module):
         belief = self.belief(jnp.take(hidden, oldest, axis=-2), features)
         return EncoderCarry(hidden, features, carry.ticks + 1), belief
 
+    def unheard(self, carry: EncoderCarry, transition: Transition) -> EncoderCarry:
+        """A decision in which no reward was heard leaves no trace; the transition's reward means nothing."""
+        return carry
+
     def along(self, transitions: Transition) -> Belief:
         """Beliefs after each of up to W transitions on the last axis, nothing known before the first.
 

@@ -81,6 +81,10 @@ class Sharpened(eqx.Module):
         own, belief = one(own, guess, state, jnp.asarray(transition.reward) / encoder.reward_scale)
         return Memory(carry, *own), belief
 
+    def unheard(self, memory: Memory, transition: Transition) -> Memory:
+        """A decision in which no reward was heard leaves no trace; the transition's reward means nothing."""
+        return memory
+
     @property
     def _window(self) -> int:
         assert self.encoder.window is not None  # `can_sharpen`

@@ -93,6 +93,11 @@ class Payment:
         """In decisions."""
         return round(self.delay_s / DECISION_DT)
 
+    @property
+    def has_gaps(self) -> bool:
+        """Whether there are decisions in which nothing is heard."""
+        return self.delay > 0 or self.dropped > 0
+
     @cached_property
     def law(self) -> RewardLaw:
         """What is earned in a state, without costs."""
