@@ -160,7 +160,9 @@ def rollout_on_robot(
     return Episodes(state, earned, belief, subgoal, fell)
 
 
-def follow(controller: Controller, body: Simulation, subgoal: Subgoal, belief: Belief | None = None) -> Float[np.ndarray, "robot action"]:
+def follow(
+    controller: Controller, body: Simulation, subgoal: Subgoal, belief: Belief | None = None
+) -> Float[np.ndarray, "robot action"]:
     """One control step of every robot; the actions that were taken."""
     pose = body.pose().astype(np.float32)
     action = np.asarray(joint_action(controller, controller.see(body), pose, subgoal, belief))

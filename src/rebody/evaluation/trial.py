@@ -161,7 +161,9 @@ def without_slot(trial: Trial, specs: list[TaskSpec]) -> list[str]:
 
 def _check_payment(trial: Trial) -> None:
     if trial.thesis:
-        raise RebodyError("a law pays decisions of 0.1 s, and in thesis mode they are others: leave --law or --thesis out.")
+        raise RebodyError(
+            "a law pays decisions of 0.1 s, and in thesis mode they are others: leave --law or --thesis out."
+        )
     if KINDS[trial.agent].by_own_laws:
         raise RebodyError(
             f"agent '{trial.agent}' believes by the families' own laws and makes no sense of another: leave --law out."

@@ -96,6 +96,14 @@ class SharpenedByAnyLaw(eqx.Module):
         own, belief = one(own, guess, *states, jnp.asarray(transition.reward, jnp.float32))
         return eqx.tree_at(lambda m: m.carry, own, carry, is_leaf=lambda leaf: leaf is None), belief
 
+    def unheard(self, memory: LawMemory, transition: Transition) -> LawMemory:
+        """A decision in which nothing was heard: a later reward may be for its state."""
+        one = self._seeing
+        for _ in jnp.shape(transition.state.x):
+            one = jax.vmap(one)
+        states = [self._scaled(state) for state in (transition.previous, transition.state)]
+        return eqx.tree_at(lambda m: m.heard, memory, one(memory.heard, *states))
+
     def explained(self, memory: LawMemory) -> Float[Array, "*batch"]:
         """Share of the rewards' variance that the likeliest hypothesis explains.
 
@@ -110,10 +118,8 @@ class SharpenedByAnyLaw(eqx.Module):
         return scaled(state, self.encoder.fields, self.encoder.scales)
 
     def _of_one_body(self, memory: LawMemory, guess: Belief, previous, state, reward) -> tuple[LawMemory, Belief]:
-        encoder = self.encoder
-        heard = memory.heard
-        heard = jax.tree.map(lambda new, old: jnp.where(heard.has_seen, old, new), heard.seeing(previous), heard)
-        heard = heard.seeing(state).hearing(reward, encoder.fields, encoder.scales)
+        heard = self._seeing(memory.heard, previous, state)
+        heard = heard.hearing(reward, self.encoder.fields, self.encoder.scales)
         log_share, guesses = proposed(self.decoder, guess)
         before = self._likeliest(memory.experts)
         experts = tuple(
@@ -123,6 +129,10 @@ class SharpenedByAnyLaw(eqx.Module):
         memory = LawMemory(None, heard, experts, memory.noise, memory.surprises, memory.decisions + 1)
         memory = self._surprised(memory, before, reward)
         return memory, self._belief(guess, log_share, experts, heard)
+
+    def _seeing(self, heard: Thinned, previous, state) -> Thinned:
+        begun = jax.tree.map(lambda new, old: jnp.where(heard.has_seen, old, new), heard.seeing(previous), heard)
+        return begun.seeing(state)
 
     def _explain(self, expert: Expert, heard: Thinned, before: LawHypotheses, guess, decision) -> LawHypotheses:
         """The hypotheses after one more reward: those before, and from three places to begin (the encoder's guess, the

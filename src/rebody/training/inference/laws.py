@@ -42,13 +42,38 @@ class DrawnLaws(eqx.Module):
         chosen = jnp.select([self.form == i for i in range(len(paid))], paid)
         return self.scale * (chosen - self.control_cost * jnp.mean(action**2, axis=-1)) + self.offset
 
-    def heard(
-        self, past: Float[AnyArray, "late *batch"], noise: Float[AnyArray, "*batch"]
-    ) -> Float[AnyArray, "*batch"]:
-        """What is heard: what was earned a while ago, with noise of a unit Gaussian as large as it is; `past` has the
-        newest first."""
-        late = jnp.take_along_axis(past, self.delay[None], axis=0)[0]
-        return late + self.scale * self.noise * noise
+
+class Pay(eqx.Module):
+    """What episodes are paid, decision after decision."""
+
+    laws: DrawnLaws | None
+    """None for each family's own law."""
+    owed: Float[AnyArray, "late *batch"]
+    """What was earned last, the newest first."""
+    decision: Int[AnyArray, ""]
+
+    def after(
+        self,
+        families: FamilySet,
+        task: Task,
+        state: GlobalState,
+        action: Float[AnyArray, "*batch action"],
+        key: PRNGKeyArray,
+    ) -> tuple["Pay", Float[AnyArray, "*batch"]]:
+        """The pay after one more decision, and what is heard then: before anything is due, the first that is earned."""
+        if self.laws is None:
+            return self, families.reward(task, state)
+        earned = self.laws.earned(families, task, state, action)
+        owed = jnp.where(self.decision == 0, earned, jnp.concatenate([earned[None], self.owed[:-1]]))
+        due = jnp.take_along_axis(owed, self.laws.delay[None], axis=0)[0]
+        noise = self.laws.scale * self.laws.noise * jax.random.normal(key, due.shape)
+        return Pay(self.laws, owed, self.decision + 1), due + noise
+
+
+def first_pay(laws: "LawDistribution | None", key: PRNGKeyArray, shape: tuple[int, ...]) -> Pay:
+    """Before the first decision, by laws that are drawn anew."""
+    drawn = None if laws is None else laws.draw(key, shape)
+    return Pay(drawn, jnp.zeros((LATEST + 1, *shape)), jnp.zeros((), jnp.int32))
 
 
 @dataclass(frozen=True)
