@@ -49,7 +49,7 @@ def assert_none_lies_beyond(family, ends, low, high, shares, targets):
     ends, low, high = np.array(ends), np.array(low), np.array(high)
     pay = paid(family, targets, ends[0] + np.array(shares) * (ends[1] - ends[0]))
     for bounds in (payable(family, tuple(ends), Box(tuple(low), tuple(high))), payable(family, tuple(ends))):
-        assert pay.min() >= bounds[0] - 1e-4 * (1 - bounds[0])
+        assert pay.min() >= bounds[0] - 1e-4 * (1 + abs(bounds[0]))
         assert pay.max() <= bounds[1] + 1e-4
 
 
