@@ -166,5 +166,5 @@ def test_a_model_that_cannot_be_used_is_named(write_own, toml, mjcf, says):
 
 
 def test_an_unknown_name_is_no_path():
-    with pytest.raises(RebodyError, match=r"Did you mean .hopper.\?.*go1, hopper, quadruped, walker, or the path"):
+    with pytest.raises(RebodyError, match=r"Did you mean 'hopper'\?.*go1, hopper, quadruped, walker, or the path"):
         load_robot("hoper")
