@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.walking import robot_that_is_there
 
 from rebody.bodies import RobotBatch, load_robot, shipped_robots
 from rebody.bodies.robot import Fall
 from rebody.errors import RebodyError
 from rebody.names import ROBOTS
 from rebody.ranges import Box, interval
-from tests.walking import robot_that_is_there
 
 ANT = Path(__file__).parents[2] / "examples" / "ant" / "ant.toml"
 

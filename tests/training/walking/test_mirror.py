@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.walking import robot_that_is_there
 
 from rebody.bodies import load_robot
 from rebody.bodies.walking.batch import JointBatch
 from rebody.errors import RebodyError
 from rebody.training.walking.mirror import mirror_of
-from tests.walking import robot_that_is_there
 
 
 @pytest.fixture

@@ -65,7 +65,8 @@ class JointBatch(GaitBatch):
         """RebodyError for a robot whose description says nothing of a policy."""
         super().__init__(spec, size, threads, joint_interface(spec))
         self.actions = len(self.joints.names)
-        self._feet, self._geoms, self._turned = feet_of(spec), self._batch.bind("geom_xpos"), self._batch.bind("geom_xmat")
+        self._geoms, self._turned = self._batch.bind("geom_xpos"), self._batch.bind("geom_xmat")
+        self._feet = feet_of(spec)
         self._extent, self._round = extents(spec.model, self._feet)
 
     def step(self, actions):
@@ -140,9 +141,7 @@ def feet_of(spec: RobotSpec) -> list[int]:
     return [geoms[name] for name in named]
 
 
-def extents(
-    model: mujoco.MjModel, geoms: list[int]
-) -> tuple[Float[np.ndarray, "geom 3"], Float[np.ndarray, " geom"]]:
+def extents(model: mujoco.MjModel, geoms: list[int]) -> tuple[Float[np.ndarray, "geom 3"], Float[np.ndarray, " geom"]]:
     """How far geoms reach from their centres: along their own axes, and from there in every direction [m]. Of other
     shapes than spheres, capsules and boxes the sphere around them.
     """
