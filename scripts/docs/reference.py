@@ -23,8 +23,8 @@ EXAMPLES = ("examples/ant/ant.toml", "examples/logs/cheetah.csv", "examples/logs
 API = {
     f"api/{path.removesuffix('.py').replace('/', '.')}.md": f"src/rebody/{path}"
     for path in (
-        *("evaluation", "training", "agents", "envs", "inference", "inference/mixture", "control", "bodies", "tasks"),
-        *("store", "nn", "types.py", "errors.py"),
+        *("evaluation", "training", "agents", "envs", "standard", "inference", "inference/mixture", "control"),
+        *("bodies", "tasks", "store", "nn", "types.py", "errors.py"),
     )
 }
 """Pages of the Python API, and the package or module that each shows."""

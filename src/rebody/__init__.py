@@ -6,6 +6,7 @@ import gymnasium
 
 from rebody.envs import register_environments
 from rebody.errors import RebodyError
+from rebody.standard import register_environments as register_standard_tasks
 
 if TYPE_CHECKING:
     from rebody.agents.live import load_agent
@@ -36,3 +37,4 @@ def _tracker_env(**settings: Any) -> gymnasium.Env:
 
 
 register_environments(tracker_env=f"{__name__}:{_tracker_env.__name__}")
+register_standard_tasks()

@@ -188,6 +188,9 @@ class Listener(eqx.Module):
         mean = jnp.stack([ticks + 1, state.vx, transition.reward, before.x, state.x], axis=-1)
         return ticks + 1, Belief(mean, jnp.ones_like(mean))
 
+    def unheard(self, ticks, transition):
+        return ticks
+
 
 @pytest.mark.parametrize("tick_steps", [1, 2, 3, 4, 5])
 def test_in_thesis_mode_the_module_hears_of_the_world_once_per_stride(controller, families, cheetah, tick_steps):
@@ -247,6 +250,9 @@ class Deaf(eqx.Module):
 
     def step(self, memory, transition):
         return memory, self.prior(memory.shape)
+
+    def unheard(self, memory, transition):
+        return memory
 
 
 def test_bayes_finds_goals_on_the_toy(inference):

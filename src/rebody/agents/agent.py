@@ -27,6 +27,9 @@ class Observation(eqx.Module):
 
     state: GlobalState
     reward: Float[AnyArray, "*batch"]
+    heard: Bool[AnyArray, "*batch"] | None = None
+    """Where the reward was heard; None for everywhere. Elsewhere it means nothing, and memories must have the episode
+    first in every array."""
 
 
 class Command(eqx.Module):
@@ -50,6 +53,10 @@ class Inferrer(Protocol):
 
     def step(self, memory: Any, transition: Transition, /) -> tuple[Any, Belief]:
         """Take in a transition."""
+        ...
+
+    def unheard(self, memory: Any, transition: Transition, /) -> Any:
+        """Its memory after a transition whose reward was not heard; the belief stays."""
         ...
 
 
@@ -86,14 +93,20 @@ class Agent(eqx.Module):
         return carry, command
 
     def decide(self, carry: Carry, observation: Observation) -> tuple[Carry, Command]:
-        """Take in the transition since the last decision; speak anew at every `stride`-th."""
+        """Take in the transition since the last decision, but for episodes in which no reward was heard; speak anew at
+        every `stride`-th.
+        """
         transition = Transition(carry.previous, observation.reward, observation.state)
-        memory, belief = self.inferrer.step(carry.memory, transition)
-        return self._speak(carry, memory, belief, observation.state)
+        taken_in = self.inferrer.step(carry.memory, transition)
+        if observation.heard is not None:
+            missed = self.inferrer.unheard(carry.memory, transition), carry.belief
+            taken_in = _chosen(observation.heard, taken_in, missed)
+        return self._speak(carry, *taken_in, observation.state)
 
     def pass_over(self, carry: Carry, state: GlobalState) -> tuple[Carry, Command]:
-        """A decision before which no reward was heard: memory and belief stay as they are, time goes on."""
-        return self._speak(carry, carry.memory, carry.belief, state)
+        """A decision before which no reward was heard: the belief stays as it is, time goes on."""
+        transition = Transition(carry.previous, jnp.zeros(state.x.shape), state)
+        return self._speak(carry, self.inferrer.unheard(carry.memory, transition), carry.belief, state)
 
     def _speak(self, carry: Carry, memory: Any, belief: Belief, state: GlobalState) -> tuple[Carry, Command]:
         fresh = self.command(state, belief, carry.decisions)
@@ -243,6 +256,15 @@ class IdleAgent(Agent):
     def command(self, state: GlobalState, belief: Belief, decision: Int[AnyArray, ""]) -> Command:
         """No force; of a robot, a speed of zero where the families have a speed, else where it began."""
         return Command(jnp.zeros((*state.x.shape, self.actions)), standing_still(self.families, state.x.shape))
+
+
+def _chosen(which: Bool[AnyArray, "*batch"], yes: Any, no: Any) -> Any:
+    """Of two trees whose arrays begin with the shape of `which`."""
+
+    def of_leaf(yes, no):
+        return jnp.where(jnp.reshape(which, which.shape + (1,) * (yes.ndim - which.ndim)), yes, no)
+
+    return jax.tree.map(of_leaf, yes, no)
 
 
 def standing_still(families: FamilySet, shape: tuple[int, ...]) -> Subgoal:

@@ -15,6 +15,7 @@ from rebody.agents.doubts import RECENT_S, RewardWatch
 from rebody.bodies.robot import wrap_angle
 from rebody.errors import RebodyError
 from rebody.inference import Encoder
+from rebody.inference.any_law import SharpenedByAnyLaw
 from rebody.inference.contract import Contract
 from rebody.inference.covariance import believed_covariances, heard_covariances
 from rebody.inference.mixture.padded import MixturePrior
@@ -56,7 +57,7 @@ class LiveBelief:
 
     def __init__(
         self,
-        inferrer: Encoder | Sharpened,
+        inferrer: Encoder | Sharpened | SharpenedByAnyLaw,
         reader: Probe | PlaceReader,
         mixture: MixturePrior | None,
         contract: Contract,
@@ -127,7 +128,7 @@ class LiveBelief:
 
     def _covariances(self, belief: Belief) -> list[Float[jax.Array, "size size"]]:
         """Of each family's target."""
-        if isinstance(self._inferrer, Sharpened):
+        if isinstance(self._inferrer, Sharpened | SharpenedByAnyLaw):
             return heard_covariances(self._inferrer, self._memory)
         return believed_covariances(self._reader, belief)
 
@@ -166,7 +167,9 @@ def _wrapped(angle: float) -> float:
 
 
 @eqx.filter_jit
-def _take_in(inferrer: Encoder | Sharpened, memory: Any, transition: Transition) -> tuple[Any, Belief]:
+def _take_in(
+    inferrer: Encoder | Sharpened | SharpenedByAnyLaw, memory: Any, transition: Transition
+) -> tuple[Any, Belief]:
     return inferrer.step(memory, transition)
 
 

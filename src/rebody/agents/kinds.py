@@ -76,6 +76,8 @@ class Kind:
     """Whether its module may tick once per stride (6.3.3)."""
     sharpens: bool = False
     """Whether its beliefs may be sharpened; policies that learned on a robot have those that they learned with."""
+    by_own_laws: bool = False
+    """Whether it believes by the families' own laws, so that it makes no sense of another payment."""
     on_robots_alone: bool = False
     """Whether its policy learned on a robot, so that a point mass cannot have it."""
 
@@ -133,7 +135,7 @@ KINDS = {
     "reuse": Kind(_reuse, in_thesis_mode=True, sharpens=True),
     "retrain": Kind(_retrain, in_thesis_mode=True, on_robots_alone=True),
     "readout": Kind(_readout, in_thesis_mode=True, sharpens=True),
-    "bayes": Kind(_bayes, in_thesis_mode=True),
+    "bayes": Kind(_bayes, in_thesis_mode=True, by_own_laws=True),
     "oracle": Kind(_oracle),
     "flat": Kind(_flat, on_robots_alone=True),
     "scratch": Kind(_scratch, on_robots_alone=True),

@@ -33,6 +33,7 @@ from rebody.control.step_predictor import StepPredictor
 from rebody.control.tracker import Tracker
 from rebody.errors import RebodyError
 from rebody.inference import Encoder, InferenceConfig, InferenceModule
+from rebody.inference.any_law import SharpenedByAnyLaw
 from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import MixturePrior, no_mixture
 from rebody.inference.probe import Probe, unfitted
@@ -90,11 +91,15 @@ class Inference:
         module = self.parts.module
         return can_sharpen(module.encoder, module.decoder, self.contract.families)
 
-    def believing(self, sharpen: bool) -> tuple[Encoder | Sharpened, Probe | PlaceReader]:
+    def believing(self, sharpen: bool) -> tuple[Encoder | Sharpened | SharpenedByAnyLaw, Probe | PlaceReader]:
         """What believes, and what reads its beliefs: sharpened where that is wanted and can be, else the encoder."""
         module = self.parts.module
         if not (sharpen and self.can_sharpen):
             return module.encoder, self.parts.probe
+        if module.decoder.hears_any_law:
+            return SharpenedByAnyLaw(module.encoder, module.decoder), PlaceReader(
+                module.decoder, self.contract.families
+            )
         sharpened = Sharpened(module.encoder, module.decoder, tells_evidence=self.parts.high_level is None)
         return sharpened, PlaceReader(module.decoder, self.contract.families)
 

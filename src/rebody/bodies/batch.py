@@ -109,15 +109,19 @@ class RobotBatch(Simulation):
     def _advance(self) -> None:
         """A control step; RebodyError if a simulation diverged."""
         before = self._root()
+        self._simulate()
+        self._trail[:, :-1], self._trail[:, -1] = self._trail[:, 1:], before
+        self.lying_s[:] = np.where(self.spec.lies(self.qpos), self.lying_s + self.spec.control_dt, 0.0)
+        self.pace[:] = self.spec.next_pace(self.pace, self.spec.readout.forward(self._root(), before))
+
+    def _simulate(self) -> None:
+        """The physics of a control step."""
         self._batch.step(nstep=self.spec.frame_skip)
         if self._batch.warning[:, _DIVERGED, 1].any():
             raise RebodyError(
                 f"the simulation of '{self.spec.name}' diverged; check that its actions are finite, "
                 "or lower the model's time step."
             )
-        self._trail[:, :-1], self._trail[:, -1] = self._trail[:, 1:], before
-        self.lying_s[:] = np.where(self.spec.lies(self.qpos), self.lying_s + self.spec.control_dt, 0.0)
-        self.pace[:] = self.spec.next_pace(self.pace, self.spec.readout.forward(self._root(), before))
 
     def observe(self):
         """By the robot's observation mapping."""

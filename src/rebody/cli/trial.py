@@ -24,6 +24,7 @@ from rebody.evaluation.trial import POINT_MASS, Trial
 from rebody.names import AGENTS
 from rebody.ranges import Count, Decisions, Seconds
 from rebody.tasks.family_file import read_families
+from rebody.tasks.payment import read_payment
 
 AGENT_HELP = "; ".join(f"{name}: {what}" for name, what in AGENTS.items())
 
@@ -66,11 +67,14 @@ class TrialOptions:
     """Thesis mode (6.3.3): the module hears of the world once per stride only."""
     families: Path | None = None
     """File of your own families, TOML or Python."""
+    law: str | None = None
+    """How all tasks are paid: a form's name or a TOML file (docs/reward-laws.md); default is each family's own law."""
 
     def load(self) -> Trial:
         """Load the parts; RebodyError where an option makes no sense or a part cannot be had."""
         check_agent(self.agent)
         families = read_families(self.families)  # first: artifacts may name its laws
+        payment = read_payment(self.law)
         inference, robot = load_inference(self.inference), None
         parts: dict[str, Any] = {"tracker": None}
         if self.robot != POINT_MASS:
@@ -87,6 +91,7 @@ class TrialOptions:
             stride=self._fixed_stride(),
             horizon=self.horizon or (1 if self.thesis else HORIZON),
             thesis=self.thesis,
+            payment=payment,
             **parts,
         )
 

@@ -18,6 +18,7 @@ from rebody.agents.controller import Controller, FlatController, TrackerControll
 from rebody.agents.parts import (
     Inference,
 )
+from rebody.agents.payday import first_payday
 from rebody.agents.rollout import Episodes, Starts, rollout_on_robot, rollout_on_toy
 from rebody.bodies import simulate
 from rebody.bodies.walking.exact import ExactWalkers
@@ -82,6 +83,7 @@ def evaluate(trial: Trial, specs: list[TaskSpec], seeds: int, yardsticks: Yardst
         frozen=frozen,
         sharpened=trial.sharpens,
         family_set=trial.in_play,
+        law=trial.payment,
         episodes=episode_results(
             trial.in_play, specs, episode_seeds, tasks, episodes, read, clusters, yardsticks.returns
         ),
@@ -162,14 +164,14 @@ def trial_agent(trial: Trial, tasks: Task) -> Agent:
 
 def run_trial(trial: Trial, agent: Agent, tasks: Task, starts: Starts) -> Episodes:
     """Episodes as arrays, 0.1 s apart; `tasks` are the active ones, [time, episode], `starts` seeds of the resets."""
-    families = trial.in_play
+    families, payday = trial.in_play, first_payday(trial.payment, starts)
     if trial.robot is None:
-        episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, families)
+        episodes = rollout_on_toy(agent, trial.toy or trial.inference.toy, tasks, families, payday=payday)
     else:
         clock, controller = _clock(trial), trial_controller(trial)
         make = ExactWalkers if trial.goes_exactly else simulate
         episodes = rollout_on_robot(
-            agent, controller, trial.robot, tasks, families, starts, trial.on_frame, clock, make
+            agent, controller, trial.robot, tasks, families, starts, trial.on_frame, clock, make, payday
         )
     return jax.tree.map(np.asarray, episodes)
 

@@ -13,7 +13,7 @@ from rebody.agents.rollout import Episodes
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.summary import summarise
 from rebody.store.files import written_whole
-from rebody.tasks import Family, FamilySet
+from rebody.tasks import Family, FamilySet, Payment
 from rebody.tasks.figures import final_error, final_squared_error, ripple
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import DECISION_DT, AnyArray, Task
@@ -40,6 +40,8 @@ class Results:
     episodes: list[EpisodeResult]
     sharpened: bool = False
     """Whether the agent's beliefs were sharpened; files of earlier releases do not say, and there they were not."""
+    law: Payment | None = None
+    """How all tasks were paid; None for each family's own law, which is all that earlier releases knew."""
 
     def of(self, family: str) -> list[EpisodeResult]:
         """Episodes whose last task is of that family."""
@@ -61,7 +63,8 @@ class Results:
         names = [field.name for field in fields(self) if field.name != "episodes"]
         return {
             "version": VERSION,
-            **{name: getattr(self, name) for name in names if name != "family_set"},
+            **{name: getattr(self, name) for name in names if name not in ("family_set", "law")},
+            "law": None if self.law is None else asdict(self.law),
             "families": [asdict(family) for family in self.family_set],
             "decision_dt": DECISION_DT,
             "episodes": [episode.to_json() for episode in self.episodes],

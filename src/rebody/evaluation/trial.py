@@ -28,7 +28,7 @@ from rebody.bodies import RobotSpec
 from rebody.bodies.toys import Toy
 from rebody.errors import RebodyError
 from rebody.inference.contract import Contract
-from rebody.tasks import FamilySet
+from rebody.tasks import FamilySet, Payment
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import DECISION_DT
 
@@ -67,6 +67,8 @@ class Trial:
     """The encoder ticks once per stride (6.3.3)."""
     step_predictor: LoadedStepPredictor | None = None
     """In thesis mode it chooses each stride anew, in place of `stride` (6.4.3)."""
+    payment: Payment | None = None
+    """How all tasks are paid; None for each family's own law."""
     goes_exactly: bool = False
     """Whether a robot that walks already goes exactly as its joystick says (`ExactWalkers`), to tell the navigator's
     share from the walking policy's."""
@@ -114,6 +116,8 @@ def check_trial(trial: Trial, specs: list[TaskSpec]) -> None:
     if trial.thesis and not kind.in_thesis_mode:
         able = [name for name, other in KINDS.items() if other.in_thesis_mode]
         raise RebodyError(f"thesis mode is for the agents {', '.join(able)}, not for '{trial.agent}'.")
+    if trial.payment is not None:
+        _check_payment(trial)
     _check_tasks(trial, specs)
     if trial.robot is None:
         if trial.thesis and trial.stride > 1:
@@ -153,6 +157,17 @@ def without_slot(trial: Trial, specs: list[TaskSpec]) -> list[str]:
         return []
     asked = dict.fromkeys(family for spec in specs for family in spec.families)
     return [family for family in asked if family not in trial.tracker.tracker.families]
+
+
+def _check_payment(trial: Trial) -> None:
+    if trial.thesis:
+        raise RebodyError(
+            "a law pays decisions of 0.1 s, and in thesis mode they are others: leave --law or --thesis out."
+        )
+    if KINDS[trial.agent].by_own_laws:
+        raise RebodyError(
+            f"agent '{trial.agent}' believes by the families' own laws and makes no sense of another: leave --law out."
+        )
 
 
 def _check_tasks(trial: Trial, specs: list[TaskSpec]) -> None:

@@ -24,6 +24,8 @@ class Contract:
     decision_dt: Positive = DECISION_DT
     """Seconds between two transitions."""
     version: int = CONTRACT_VERSION
+    any_law: bool = False
+    """Whether it hears rewards of any law, in any scale and with any bonus; else those of its families' own laws."""
 
     def check_time(self) -> None:
         """RebodyError if the module does not hear of a body as often as this release decides."""

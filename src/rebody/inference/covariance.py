@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from rebody.inference.any_law import LawMemory, SharpenedByAnyLaw
 from rebody.inference.decoder import Expert
 from rebody.inference.probe import Probe
 from rebody.inference.reader import PlaceReader
@@ -23,7 +24,9 @@ def believed_covariances(reader: Probe | PlaceReader, belief: Belief) -> list[Fl
 
 
 @eqx.filter_jit
-def heard_covariances(inferrer: Sharpened, memory: Memory) -> list[Float[Array, "size size"]]:
+def heard_covariances(
+    inferrer: Sharpened | SharpenedByAnyLaw, memory: Memory | LawMemory
+) -> list[Float[Array, "size size"]]:
     """The same by all that was heard: Laplace's approximation around the likeliest hypothesis of each family, by the
     errors that are left."""
     covariances = []

@@ -41,7 +41,8 @@ class Expert(eqx.Module):
     """
 
     reference: MLP
-    weights: MLP
+    weights: MLP | None
+    """None for one that any law may be about."""
     fields: tuple[str, ...] = eqx.field(static=True)
     scales: tuple[float, ...] = eqx.field(static=True)
     is_quantity: bool = eqx.field(static=True)
@@ -53,21 +54,30 @@ class Expert(eqx.Module):
         amounts: int,
         units: int,
         is_quantity: bool,
+        hears_any_law: bool = False,
         *,
         keys: Key[AnyArray, "2"],
     ):
         self.fields, self.scales, self.is_quantity = fields, scales, is_quantity
         self.reference = MLP(amounts, inputs_of(fields), (), key=keys[0])
-        self.weights = MLP(amounts, 1 if is_quantity else len(fields), (units,), key=keys[1])
+        weights = 1 if is_quantity else len(fields)
+        self.weights = None if hears_any_law else MLP(amounts, weights, (units,), key=keys[1])
 
     def __call__(
         self, state: Float[AnyArray, "*#batch field"], amount: Float[AnyArray, "*#batch amount"]
     ) -> Float[AnyArray, "*#batch"]:
         """The expected reward, in units of the reward scale; one amount may be of many states."""
+        assert self.weights is not None  # of any law a decoder says no rewards
         distance = jnp.abs(apart(state, self.place(amount), self.fields, self.scales))
         if self.is_quantity:
             distance = length(distance)[..., None]
         return -jnp.sum(jax.nn.softplus(self.weights(amount)) * distance, axis=-1)
+
+    def distance(
+        self, state: Float[AnyArray, "*#batch field"], amount: Float[AnyArray, "*#batch amount"]
+    ) -> Float[AnyArray, "*#batch"]:
+        """How far a state is from the place, scaled."""
+        return length(apart(state, self.place(amount), self.fields, self.scales))
 
     def place(self, amount: Float[AnyArray, "*batch amount"]) -> Float[AnyArray, "*batch field"]:
         """Where the fields would be brought, scaled; a heading is that of a vector."""
@@ -115,7 +125,8 @@ class Decoder(eqx.Module):
 
     state_head: MLP
     experts: tuple[Expert, ...]
-    log_variance: MLP
+    log_variance: MLP | None
+    """None for one that any law may be about: then it says distances, and no rewards."""
     choice: MLP | None
     kinds: int = eqx.field(static=True)
     fields: tuple[str, ...] = eqx.field(static=True)
@@ -130,6 +141,7 @@ class Decoder(eqx.Module):
         latent: int,
         kinds: int,
         units: int,
+        hears_any_law: bool = False,
         *,
         key: PRNGKeyArray,
     ):
@@ -141,11 +153,24 @@ class Decoder(eqx.Module):
         expert_keys = jax.vmap(jax.random.split)(jax.random.split(keys[1], len(read))) if kinds else keys[None, 1:3]
         scale_of = dict(zip(fields, scales, strict=True))
         self.experts = tuple(
-            Expert(own, tuple(scale_of[f] for f in own), (latent - kinds) // len(read), units, bool(kinds), keys=two)
+            Expert(
+                own,
+                tuple(scale_of[f] for f in own),
+                (latent - kinds) // len(read),
+                units,
+                bool(kinds),
+                hears_any_law,
+                keys=two,
+            )
             for own, two in zip(read, expert_keys, strict=True)
         )
-        self.log_variance = MLP(inputs + latent, 1, (units, units), key=keys[3])
+        self.log_variance = None if hears_any_law else MLP(inputs + latent, 1, (units, units), key=keys[3])
         self.choice = MLP(kinds, len(read), (), key=jax.random.fold_in(key, 4)) if kinds else None
+
+    @property
+    def hears_any_law(self) -> bool:
+        """Whether rewards may be paid by any law."""
+        return self.log_variance is None
 
     def next_state(
         self,
@@ -161,12 +186,24 @@ class Decoder(eqx.Module):
         self, next_state: Float[AnyArray, "*batch field"], latent: Float[AnyArray, "*batch latent"]
     ) -> Prediction:
         """The reward's prediction, in units of the reward scale; one expert where z is not split."""
-        kind, amount = latent[..., : self.kinds], latent[..., self.kinds :]
-        own = zip(self.experts, self.amounts(amount), strict=True)
+        assert self.log_variance is not None
+        own = zip(self.experts, self.amounts(latent[..., self.kinds :]), strict=True)
         mean = jnp.stack([expert(self.read(expert, next_state), amounts) for expert, amounts in own], axis=-1)
-        log_share = jax.nn.log_softmax(self.choice(kind), axis=-1) if self.choice else jnp.zeros_like(mean)
         inputs = jnp.concatenate([seen(next_state, self.fields, self.scales), latent], axis=-1)
-        return Prediction(mean, log_share, jnp.clip(self.log_variance(inputs)[..., 0], -12.0, 4.0))
+        return Prediction(mean, self.log_shares(latent), jnp.clip(self.log_variance(inputs)[..., 0], -12.0, 4.0))
+
+    def distances(
+        self, next_state: Float[AnyArray, "*#batch field"], latent: Float[AnyArray, "*#batch latent"]
+    ) -> Float[AnyArray, "*#batch expert"]:
+        """How far a state is from each expert's place, scaled."""
+        own = zip(self.experts, self.amounts(latent[..., self.kinds :]), strict=True)
+        return jnp.stack([each.distance(self.read(each, next_state), amounts) for each, amounts in own], axis=-1)
+
+    def log_shares(self, latent: Float[AnyArray, "*batch latent"]) -> Float[AnyArray, "*batch expert"]:
+        """Log-probability of each expert."""
+        if self.choice is None:
+            return jnp.zeros((*latent.shape[:-1], len(self.experts)))
+        return jax.nn.log_softmax(self.choice(latent[..., : self.kinds]), axis=-1)
 
     def interpret(self, belief: Belief) -> Belief:
         """A belief in the decoder's own terms: how likely each family is meant, then where it is to be brought.

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Float, Int, PRNGKeyArray
 
 from rebody.inference.inputs import inputs_of, rates, scaled, seen
+from rebody.inference.normaliser import Normaliser, no_moments
 from rebody.nn import GRU, MLP
 from rebody.types import DECISION_DT, AnyArray, Belief, Transition
 
@@ -23,10 +24,14 @@ class EncoderCarry(eqx.Module):
     hidden: Float[AnyArray, "*batch window units"]
     last: Float[AnyArray, "*batch feature"]  # features of the newest transition
     ticks: Int[AnyArray, ""]
+    moments: Normaliser | None = None  # of the rewards, where these are normalised
 
 
 class Encoder(eqx.Module):
-    """GRU over a window of (state, reward, next state): no action ever enters."""
+    """GRU over a window of (state, reward, next state): no action ever enters.
+
+    One that is to hear any law has rewards in units of what was heard shortly before.
+    """
 
     embed: MLP
     cell: GRU
@@ -38,6 +43,7 @@ class Encoder(eqx.Module):
     window: int | None = eqx.field(static=True)
     latent: int = eqx.field(static=True)
     kinds: int = eqx.field(static=True)
+    normalises: bool = eqx.field(static=True)
 
     def __init__(
         self,
@@ -49,6 +55,7 @@ class Encoder(eqx.Module):
         latent: int,
         kinds: int,
         units: int,
+        normalises: bool = False,
         key: PRNGKeyArray,
     ):
         """`scales` divide the fields (m, rad, m/s), `reward_scale` the reward: all near 1 afterwards.
@@ -62,7 +69,7 @@ class Encoder(eqx.Module):
         self.head = MLP(units + inputs, 2 * latent, (2 * units, 2 * units), key=keys[2])
         self.gate = MLP(units, (latent - kinds) * inputs, (units,), key=keys[3], last_scale=0.1)
         self.fields, self.scales, self.reward_scale = fields, scales, reward_scale
-        self.window, self.latent, self.kinds = window, latent, kinds
+        self.window, self.latent, self.kinds, self.normalises = window, latent, kinds, normalises
 
     def initial(self, shape: tuple[int, ...] = ()) -> EncoderCarry:
         """Nothing seen yet."""
@@ -70,6 +77,7 @@ class Encoder(eqx.Module):
             jnp.zeros((*shape, self.window or 1, self.cell.units)),
             jnp.zeros((*shape, inputs_of(self.fields) + len(self.fields) + 2)),
             jnp.zeros((), jnp.int32),
+            no_moments(shape) if self.normalises else None,
         )
 
     def prior(self, shape: tuple[int, ...] = ()) -> Belief:
@@ -78,6 +86,10 @@ class Encoder(eqx.Module):
 
     def step(self, carry: EncoderCarry, transition: Transition) -> tuple[EncoderCarry, Belief]:
         """One decision: take in a transition, say what is believed now."""
+        moments = carry.moments
+        if moments is not None:
+            moments = moments.hearing(transition.reward)
+            transition = Transition(transition.previous, moments(transition.reward), transition.state)
         features = self.features(transition)
         window = self.window or jnp.iinfo(jnp.int32).max
         begins = carry.ticks % window
@@ -90,10 +102,15 @@ class Encoder(eqx.Module):
         hidden = self.cell(jnp.where(is_new, 0.0, carry.hidden), inputs)
         oldest = jnp.where(carry.ticks < window, 0, (carry.ticks + 1) % window)
         belief = self.belief(jnp.take(hidden, oldest, axis=-2), features)
-        return EncoderCarry(hidden, features, carry.ticks + 1), belief
+        return EncoderCarry(hidden, features, carry.ticks + 1, moments), belief
+
+    def unheard(self, carry: EncoderCarry, transition: Transition) -> EncoderCarry:
+        """A decision in which no reward was heard leaves no trace; the transition's reward means nothing."""
+        return carry
 
     def along(self, transitions: Transition) -> Belief:
-        """Beliefs after each of up to W transitions on the last axis, nothing known before the first.
+        """Beliefs after each of up to W transitions on the last axis, nothing known before the first; rewards are
+        normalised already where they are to be.
 
         Shapes: transitions [*batch, time], belief [*batch, time, latent].
         """

@@ -50,6 +50,12 @@ class ExactPosterior(eqx.Module):
         log_posterior = jax.nn.log_softmax(changed - 0.5 * surprise**2)
         return log_posterior, self.belief(log_posterior)
 
+    def unheard(
+        self, memory: Float[AnyArray, "*batch point"], transition: Transition
+    ) -> Float[AnyArray, "*batch point"]:
+        """A decision in which no reward was heard leaves no trace; the transition's reward means nothing."""
+        return memory
+
     def belief(self, log_posterior: Float[AnyArray, "*batch point"]) -> Belief:
         """The most probable task, as (family, target ...); the variance is what is left of the probability."""
         mode = jnp.argmax(log_posterior, axis=-1)

@@ -66,23 +66,33 @@ class Hypotheses(eqx.Module):
         return Hypotheses(self.amounts, root, aim, past, self.honest, self.cost, self.volume)
 
     def spread(self, expert: Expert) -> Float[Array, " amount"]:
-        """Variances of the amounts by which the place is in as much doubt as it is: around the likeliest, the others
-        counted as likely as they are.
+        """`spread_of` these hypotheses."""
+        return spread_of(expert, self.amounts, self.honest, self.volume - self.cost)
 
-        A belief has variances alone, and amounts hang together: their own would leave a heading in doubt whose length,
-        which means nothing, is unknown. So they are scaled, each by what it adds (as in Richardson 1972 and Lucy 1974).
-        """
-        chance = jax.nn.softmax(self.volume - self.cost)
-        places, slopes = expert.place(self.amounts), jax.vmap(jax.jacfwd(expert.place))(self.amounts)
-        within = jax.vmap(variance_along)(jnp.asarray(self.honest), slopes)
-        around = within + apart(places, places[0], expert.fields, expert.scales) ** 2
-        wanted = jnp.sum(jnp.where(chance[:, None] > 0, chance[:, None] * around, 0.0), axis=0)
-        adds = slopes[0] ** 2
-        variance = variance_along(self.honest[0], jnp.eye(len(self.amounts[0]))) + LEAST
-        for _ in range(SCALED):
-            share = wanted / (adds @ variance + TINY)
-            variance = variance * (share @ adds) / (jnp.sum(adds, axis=0) + TINY) + LEAST
-        return variance
+
+def spread_of(
+    expert: Expert,
+    amounts: Float[AnyArray, "kept amount"],
+    roots: Float[AnyArray, "kept amount amount"],
+    evidence: Float[AnyArray, " kept"],
+) -> Float[Array, " amount"]:
+    """Variances of the amounts by which the place is in as much doubt as it is: around the likeliest hypothesis, which
+    is the first, the others counted as likely as they are.
+
+    A belief has variances alone, and amounts hang together: their own would leave a heading in doubt whose length,
+    which means nothing, is unknown. So they are scaled, each by what it adds (as in Richardson 1972 and Lucy 1974).
+    """
+    chance = jax.nn.softmax(evidence)
+    places, slopes = expert.place(amounts), jax.vmap(jax.jacfwd(expert.place))(amounts)
+    within = jax.vmap(variance_along)(jnp.asarray(roots), slopes)
+    around = within + apart(places, places[0], expert.fields, expert.scales) ** 2
+    wanted = jnp.sum(jnp.where(chance[:, None] > 0, chance[:, None] * around, 0.0), axis=0)
+    adds = slopes[0] ** 2
+    variance = variance_along(roots[0], jnp.eye(amounts.shape[-1])) + LEAST
+    for _ in range(SCALED):
+        share = wanted / (adds @ variance + TINY)
+        variance = variance * (share @ adds) / (jnp.sum(adds, axis=0) + TINY) + LEAST
+    return variance
 
 
 def no_hypotheses(shape: tuple[int, ...], amounts: int) -> Hypotheses:
@@ -161,5 +171,10 @@ def all_over(expert: Expert, size: int) -> Float[AnyArray, "start amount"]:
         turn = np.linspace(0, 2 * np.pi, STARTS, endpoint=False)
         rest = [np.zeros_like(turn)] * (len(expert.fields) - 2)
         places = 0.7 * np.stack([np.cos(turn), np.sin(turn), *rest], axis=-1)
-    inputs = seen(jnp.asarray(places, jnp.float32), expert.fields, expert.scales)
+    return amounts_of(expert, jnp.asarray(places, jnp.float32))
+
+
+def amounts_of(expert: Expert, place: Float[AnyArray, "*batch own"]) -> Float[Array, "*batch amount"]:
+    """The smallest amounts that mean a place, scaled as the encoder's fields."""
+    inputs = seen(place, expert.fields, expert.scales)
     return (inputs - expert.reference.biases[0]) @ jnp.linalg.pinv(expert.reference.weights[0])

@@ -13,6 +13,7 @@ from rebody.inference.decoder import Decoder, Prediction
 from rebody.inference.encoder import Encoder
 from rebody.inference.inputs import apart, scaled
 from rebody.inference.prior import Prior
+from rebody.inference.profile import log_likelihoods
 from rebody.nn import MLP
 from rebody.ranges import Copies, Decisions, NotNegative, Number, Positive, Rate
 from rebody.tasks import FamilySet
@@ -59,6 +60,9 @@ class InferenceConfig:
     """Windows of one update."""
     decoded: Copies = 8
     """Transitions of the same episode that each belief must explain."""
+    hears_any_law: bool = False
+    """Whether rewards may be paid by any law, in any scale and with any bonus: then the encoder normalises them, and
+    what is learned is how well distances from a place explain them. It needs a split latent."""
 
     @property
     def clustered(self) -> int:
@@ -74,6 +78,8 @@ class InferenceConfig:
             raise ValueError(
                 f"families: '{turning[0]}' is told in the frame of the heading, which no module learns yet"
             )
+        if self.hears_any_law and not self.kinds:
+            raise ValueError("inference.hears-any-law needs a latent that is split: give inference.kinds")
         amounts = self.latent - self.kinds
         if self.kinds and (amounts < 1 or amounts % len(families)):
             raise ValueError(
@@ -109,6 +115,7 @@ class InferenceModule(eqx.Module):
             latent=config.latent,
             kinds=config.kinds,
             units=config.units,
+            normalises=config.hears_any_law,
             key=encoder_key,
         )
         self.decoder = Decoder(
@@ -119,6 +126,7 @@ class InferenceModule(eqx.Module):
             config.latent,
             config.kinds,
             config.units,
+            config.hears_any_law,
             key=decoder_key,
         )
         self.labeller = MLP(config.latent, families.base_tasks, (), key=label_key) if config.label_weight else None
@@ -152,14 +160,8 @@ def loss(
     predicted_state = decoder.next_state(before, evidence.action, last)
     state_error = jnp.mean(apart(predicted_state, after, fields, scales) ** 2)
 
-    shape = (*latent.shape[:2], config.decoded)
-    latents = jnp.broadcast_to(latent[:, :, None], (*shape, config.latent))
-    predicted = decoder.reward(jnp.broadcast_to(after[:, None], (*shape, after.shape[-1])), latents)
-    wanted = jnp.broadcast_to(evidence.reward[:, None] / encoder.reward_scale, shape)
-    own, loss_of_each = _explained(wanted, predicted, evidence.changed)
-    reward_loss = jnp.mean(loss_of_each)
-    reward_error = jnp.sum(own * (wanted - predicted.expectation) ** 2) / jnp.maximum(jnp.sum(own), 1e-6)
-
+    learned = _unexplained_by_any_law if config.hears_any_law else _unexplained
+    reward_loss, reward_error = learned(module, latent, after, evidence)
     reconstruction = reward_loss + config.state_weight * state_error
     if config.kinds:
         excess = jnp.maximum(jnp.abs(decoder.places(latent[..., config.kinds :])) - FARTHEST_PLACE, 0.0)
@@ -169,11 +171,46 @@ def loss(
         reconstruction = reconstruction + config.label_weight * jnp.mean(labels)
     kl = jnp.mean(prior(belief))
     metrics = {
-        "reward_error": jnp.sqrt(reward_error) * encoder.reward_scale,
+        "reward_error": reward_error,
         "state_error": jnp.sqrt(state_error),
         "kl": kl,
     }
     return reconstruction + config.kl_weight * kl, metrics
+
+
+def _unexplained(
+    module: InferenceModule,
+    latent: Float[Array, "batch time latent"],
+    after: Float[AnyArray, "batch decoded field"],
+    evidence: Evidence,
+) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """The rewards' share of the loss, and the error of their prediction in the reward's unit."""
+    decoder, scale = module.decoder, module.encoder.reward_scale
+    shape = (*latent.shape[:2], after.shape[1])
+    latents = jnp.broadcast_to(latent[:, :, None], (*shape, latent.shape[-1]))
+    predicted = decoder.reward(jnp.broadcast_to(after[:, None], (*shape, after.shape[-1])), latents)
+    wanted = jnp.broadcast_to(evidence.reward[:, None] / scale, shape)
+    own, loss_of_each = _explained(wanted, predicted, evidence.changed)
+    error = jnp.sum(own * (wanted - predicted.expectation) ** 2) / jnp.maximum(jnp.sum(own), 1e-6)
+    return jnp.mean(loss_of_each), jnp.sqrt(error) * scale
+
+
+def _unexplained_by_any_law(
+    module: InferenceModule,
+    latent: Float[Array, "batch time latent"],
+    after: Float[AnyArray, "batch decoded field"],
+    evidence: Evidence,
+) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """The same where units are unknown: by the laws that suit the rewards best, of the experts that are believed in.
+    The error is in units of the rewards' spread."""
+    decoder = module.decoder
+    distances = jnp.moveaxis(decoder.distances(after[:, None], latent[:, :, None]), -1, -2)
+    weight = (1 - evidence.changed)[:, :, None]
+    likely = log_likelihoods(distances, evidence.reward[:, None, None], weight)  # [batch, time, expert, law]
+    count = jnp.sum(weight, axis=-1, keepdims=True)
+    share = decoder.log_shares(latent)[..., None] - jnp.log(likely.shape[-1])
+    loss = -jax.nn.logsumexp(share + count * likely, axis=(-2, -1)) / jnp.maximum(count[..., 0, 0], 1.0)
+    return jnp.mean(loss), jnp.mean(jnp.exp(-jnp.max(likely, axis=(-2, -1))))
 
 
 def _explained(

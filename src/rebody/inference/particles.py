@@ -102,6 +102,10 @@ class ParticlePosterior(eqx.Module):
         memory, chance = one(memory, transition.state, reward)
         return memory, self._belief(memory, chance)
 
+    def unheard(self, memory: Memory, transition: Transition) -> Memory:
+        """A decision in which no reward was heard leaves no trace; the transition's reward means nothing."""
+        return memory
+
     @property
     def _base_tasks(self) -> list[tuple[Family, Box]]:
         return [(family, box) for family in self.families for box in family.targets]

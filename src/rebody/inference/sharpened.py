@@ -17,6 +17,7 @@ from rebody.inference.encoder import Encoder, EncoderCarry
 from rebody.inference.hypotheses import HOPELESS, Hypotheses, explain, no_hypotheses
 from rebody.inference.inputs import scaled
 from rebody.inference.refine import Heard, surprise
+from rebody.inference.telling import likely_families, proposed, told
 from rebody.tasks import FamilySet
 from rebody.types import AnyArray, Belief, Transition
 
@@ -25,10 +26,6 @@ SURPRISED, MORE_THAN_GUESS = 6.0, 1.5
 many times as far as from what the encoder's guess does; or where no hypothesis is nearer to the whole window."""
 NEW = 10.0
 """What a new hypothesis pays for the past that others have explained [nats]."""
-UNLIKELIEST = -1.0
-"""Log-probability that the encoder leaves every family at least: it is often too sure."""
-SUREST = -8.0
-"""Least log-probability that a belief tells of a family: beyond, its kinds would lie far from all that is learned."""
 FIRST_SHARP = 3
 """Rewards that a sharp belief needs: fewer are explained by any family, and the encoder knows what is likely."""
 
@@ -84,6 +81,10 @@ class Sharpened(eqx.Module):
         own, belief = one(own, guess, state, jnp.asarray(transition.reward) / encoder.reward_scale)
         return Memory(carry, *own), belief
 
+    def unheard(self, memory: Memory, transition: Transition) -> Memory:
+        """A decision in which no reward was heard leaves no trace; the transition's reward means nothing."""
+        return memory
+
     @property
     def _window(self) -> int:
         assert self.encoder.window is not None  # `can_sharpen`
@@ -93,7 +94,7 @@ class Sharpened(eqx.Module):
         """Window, rewards, how many and hypotheses after one more transition, and the belief."""
         states, rewards, heard, hypotheses = own
         decoder, window = self.decoder, self._window
-        log_share, guesses = self._proposed(guess)
+        log_share, guesses = proposed(decoder, guess)
         changed = self._is_surprised(hypotheses, log_share, guesses, state, reward) | self._explains_nothing(own)
         changed = changed & (heard > 0)
         heard = jnp.where(changed, 0, heard)
@@ -116,13 +117,6 @@ class Sharpened(eqx.Module):
         belief = jax.tree.map(lambda first, then: jnp.where(heard < FIRST_SHARP, first, then), guess, sharp)
         return (states, rewards, heard, hypotheses), belief
 
-    def _proposed(self, guess: Belief) -> tuple[Float[Array, " expert"], list[Belief]]:
-        """What the encoder says: log-probability of each expert, and its amounts."""
-        decoder, kinds = self.decoder, self.decoder.kinds
-        log_share = jax.nn.log_softmax(decoder.choice(guess.mean[:kinds])) if decoder.choice else jnp.zeros(1)
-        means, variances = (decoder.amounts(numbers[kinds:]) for numbers in (guess.mean, guess.variance))
-        return log_share, [Belief(*each) for each in zip(means, variances, strict=True)]
-
     def _is_surprised(
         self, hypotheses: Sequence[Hypotheses], log_share, guesses: list[Belief], state, reward
     ) -> Bool[Array, ""]:
@@ -144,29 +138,11 @@ class Sharpened(eqx.Module):
         return jnp.min(in_window) > 0.5 * SURPRISED**2 * jnp.minimum(heard, self._window)
 
     def _belief(self, guess: Belief, log_share, hypotheses: Sequence[Hypotheses], is_all: Bool[Array, ""]) -> Belief:
-        """The likeliest hypothesis of each expert, and kinds that say how likely each family is by the evidence."""
-        kind, choice = guess.mean[: self.decoder.kinds], self.decoder.choice
-        if choice is not None:
-            explained = jnp.stack([jnp.where(is_all, each.volume[0], 0.0) - each.cost[0] for each in hypotheses])
-            evidence = jnp.maximum(log_share, UNLIKELIEST) + explained
-            logits = jnp.asarray(choice(kind))
-            kind = kind + (self._wanted(logits, log_share, evidence) - logits) @ jnp.linalg.pinv(choice.weights[0])
+        """The likeliest hypothesis of each expert, and how likely each family is by the evidence."""
+        explained = jnp.stack([jnp.where(is_all, each.volume[0], 0.0) - each.cost[0] for each in hypotheses])
         spreads = [each.spread(expert) for expert, each in zip(self.decoder.experts, hypotheses, strict=True)]
-        mean = jnp.concatenate([kind, *(each.amounts[0] for each in hypotheses)])
-        return Belief(
-            mean,
-            jnp.concatenate([guess.variance[: self.decoder.kinds], *spreads]),
-        )
-
-    def _wanted(
-        self, logits: Float[Array, " expert"], log_share: Float[Array, " expert"], evidence: Float[Array, " expert"]
-    ) -> Float[Array, " expert"]:
-        """What the decoder is to read from the kinds."""
-        if self.tells_evidence:
-            wanted = jnp.maximum(jax.nn.log_softmax(evidence), SUREST)
-            return wanted + jnp.mean(logits) - jnp.mean(wanted)
-        first, best = jnp.argmax(log_share), jnp.argmax(evidence)
-        return logits.at[first].set(logits[best]).at[best].set(logits[first])
+        amounts, evidence = [each.amounts[0] for each in hypotheses], likely_families(log_share) + explained
+        return told(self.decoder, guess, log_share, evidence, amounts, spreads, self.tells_evidence)
 
 
 def _least(hypotheses: Sequence[Hypotheses]) -> Float[Array, ""]:

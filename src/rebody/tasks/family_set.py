@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int, PRNGKeyArray
 from rebody.errors import unknown
 from rebody.ranges import Box
 from rebody.tasks.family import Family, Settle
-from rebody.tasks.laws import law_named
+from rebody.tasks.laws import RewardLaw, law_named
 from rebody.tasks.quantities import length, wrapped_where
 from rebody.types import AnyArray, GlobalState, Task
 
@@ -126,16 +126,22 @@ class FamilySet:
         """What is achieved minus the target."""
         return self.difference(task.family, self.achieved(task.family, state), task.target)
 
-    def reward(self, task: Task, state: GlobalState) -> Float[AnyArray, "*batch"]:
-        """Reward of the decision that led to `state`, by each family's law."""
-        distance, size = length(self.error(task, state)), length(task.target)
-        scale = jnp.maximum(size, jnp.asarray([family.floor for family in self.families])[task.family])
+    def reward(self, task: Task, state: GlobalState, law: RewardLaw | None = None) -> Float[AnyArray, "*batch"]:
+        """Reward of the decision that led to `state`, by each family's law, or all by another one."""
+        error, scale = self.error(task, state), self.scale(task)
+        if law is not None:
+            return law.pay(law.distance(error, task.target), scale)
         laws = dict.fromkeys(family.reward_law for family in self.families)
-        paid = [law.pay(distance, scale) for law in laws]
+        paid = [each.pay(each.distance(error, task.target), scale) for each in laws]
         if len(paid) == 1:
             return paid[0]
         which = jnp.asarray([list(laws).index(family.reward_law) for family in self.families])[task.family]
         return jnp.select([which == i for i in range(len(paid))], paid)
+
+    def scale(self, task: Task) -> Float[AnyArray, "*batch"]:
+        """What relative distances are told in: the size of the target, or the family's floor."""
+        floors = jnp.asarray([family.floor for family in self.families])
+        return jnp.maximum(length(task.target), floors[task.family])
 
     def settles(self, family: Int[AnyArray, "*batch"], settle: Settle) -> Bool[AnyArray, "*batch"]:
         """Whether that is how each family judges."""

@@ -2,9 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
 
 from rebody.errors import RebodyError, unknown
+from rebody.tasks.quantities import length
+
+Measure = Literal["l2", "l1", "along"]
+"""How far it is from a target: the length of the error, the sum of its absolute numbers, or how little lies along the
+target's direction, minus what does."""
 
 
 @dataclass(frozen=True)
@@ -18,6 +27,18 @@ class RewardLaw:
     """(distance, scale) -> reward, of arrays [...]; the scale is max(|target|, the family's floor)."""
     source: str = ""
     """SHA-256 of the file that it comes from; none for those of the package."""
+    measure: Measure = "l2"
+    """Which distance."""
+
+    def distance(self, error: Any, target: Any) -> Any:
+        """Of errors, what is reached minus the target, [*batch, number] both."""
+        xp = jnp if isinstance(error, jax.Array) else np
+        if self.measure == "l1":
+            return xp.sum(xp.abs(error), axis=-1)
+        if self.measure == "along":
+            towards = target / xp.maximum(length(target), 1e-9)[..., None]
+            return -xp.sum((error + target) * towards, axis=-1)
+        return length(error)
 
 
 LAWS = {

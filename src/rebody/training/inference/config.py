@@ -14,6 +14,7 @@ from rebody.inference import InferenceConfig
 from rebody.inference.mixture.settings import MixtureConfig
 from rebody.ranges import Copies, Count, Decisions, Episodes, NotNegative, Number, Positive, Rate, Share
 from rebody.tasks import FamilySet
+from rebody.training.inference.laws import LawDistribution
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,8 @@ class MetaConfig:
     """Disturbances of half of the episodes."""
     switch_share: Share = 0.0
     """Share of episodes in which the task changes once, at any decision."""
+    laws: LawDistribution | None = None
+    """How the laws are drawn that episodes are paid by; each family's own law where there is none."""
     observation_noise: NotNegative = 0.0
     """Variance of the noise on every observed field (thesis, captions of 6.20)."""
     start: tuple[NotNegative, NotNegative] = (12.0, 3.0)

@@ -19,6 +19,7 @@ from rebody.store import Artifact
 from rebody.tasks import FamilySet
 from rebody.tasks.family_set import sample_episodes
 from rebody.training.inference.config import MetaConfig
+from rebody.training.inference.laws import first_pay
 from rebody.types import AnyArray, Belief, GlobalState, Task, Transition, global_state
 
 
@@ -87,11 +88,11 @@ class Episodes(eqx.Module):
 def collect(
     module: InferenceModule, actor: Actor, toy: Toy, config: MetaConfig, roles: Roles, key: PRNGKeyArray
 ) -> Episodes:
-    """Let toys act on hidden tasks by what they believe.
+    """Let toys act on hidden tasks by what they believe. Rewards are those that are heard.
 
     The belief is always built from the running episode alone, never from stored ones.
     """
-    task_key, start_key, observe_key, held_key, walk_key, known_key = jax.random.split(key, 6)
+    task_key, start_key, observe_key, held_key, walk_key, known_key, law_key = jax.random.split(key, 7)
     shape = (config.episodes,)
     families = config.families
     task = sample_episodes(families, task_key, config.episodes, config.decisions, config.switch_share)
@@ -103,7 +104,7 @@ def collect(
 
     def decide(walk, inputs):
         task, known, key = inputs
-        body, seen, carry, belief, held = walk
+        body, seen, carry, belief, held, pay = walk
         action_key, step_key, noise_key, wander_key = jax.random.split(key, 4)
         observation = observed(seen, belief, known)
         sampled, _ = actor.sample(observation, action_key)
@@ -111,12 +112,12 @@ def collect(
         action = jnp.where(roles.decides[:, None], actor(observation), sampled)
         action = jnp.where(roles.wanders[:, None], held, action)
         body = toy.step(body, action, step_key)
-        earned = families.reward(task, toy.observe(body))
+        pay, heard = pay.after(families, task, toy.observe(body), action, jax.random.fold_in(noise_key, 1))
         now_seen = _observe(toy, body, config, noise_key)
-        carry, belief = encoder.step(carry, Transition(seen, earned, now_seen))
-        return (body, now_seen, carry, belief, held), (now_seen, belief, action, earned)
+        carry, belief = encoder.step(carry, Transition(seen, heard, now_seen))
+        return (body, now_seen, carry, belief, held, pay), (now_seen, belief, action, heard)
 
-    walk = (body, seen, encoder.initial(shape), belief, held)
+    walk = (body, seen, encoder.initial(shape), belief, held, first_pay(config.laws, law_key, shape))
     keys = jax.random.split(walk_key, config.decisions)
     known = _known(task, roles, config, known_key)
     active, known = jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), (task, known))

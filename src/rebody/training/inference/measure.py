@@ -119,6 +119,7 @@ def contract_of(config: MetaConfig) -> Contract:
         fields=config.inference.fields,
         window=config.inference.window,
         families=config.families,
+        any_law=config.inference.hears_any_law,
     )
 
 

@@ -11,6 +11,7 @@ from rebody.tasks import FamilySet
 from rebody.tasks.line import GOAL, JUMP, STAND, VELOCITY, both_ways
 from rebody.tasks.plane import PLANE
 from rebody.training.inference.config import MetaConfig
+from rebody.training.inference.laws import LawDistribution
 
 
 def position() -> MetaConfig:
@@ -156,6 +157,22 @@ def plane() -> MetaConfig:
     )
 
 
+def plane_any() -> MetaConfig:
+    """`plane`, whatever way rewards are paid: laws are drawn anew for each episode."""
+    return _hearing_any_law(plane())
+
+
+def goal_velocity_any() -> MetaConfig:
+    """`goal-velocity` with laws drawn anew for each episode; its policy is told tasks, as beliefs are sharp."""
+    base = replace(goal_velocity(), acts_by="task", home_share=0.5, wander_iterations=5, joint_iterations=55)
+    return _hearing_any_law(replace(base, evaluate_every=20, held_out=100))
+
+
+def _hearing_any_law(base: MetaConfig) -> MetaConfig:
+    inference = replace(base.inference, hears_any_law=True, decoded=16)
+    return replace(base, inference=inference, laws=LawDistribution(), evaluate_every=30, held_out_at_end=200)
+
+
 def _noisy(variance: float) -> MetaConfig:
     return replace(goal_velocity(), randomisation=CALM, observation_noise=variance)
 
@@ -171,4 +188,6 @@ PRESETS: dict[str, Callable[[], MetaConfig]] = {
     "goal-velocity-stand": goal_velocity_stand,
     "goal-velocity-jump": goal_velocity_jump,
     "plane": plane,
+    "goal-velocity-any": goal_velocity_any,
+    "plane-any": plane_any,
 }

@@ -22,6 +22,7 @@ from rebody.control.sac import SACBatch, SACState
 from rebody.errors import RebodyError
 from rebody.inference.mixture.padded import Clusters, clusters_of, no_clusters
 from rebody.inference.module import Evidence, InferenceModule, loss
+from rebody.inference.normaliser import normalised
 from rebody.inference.prior import Prior, SplitPrior, unit_gaussian
 from rebody.inference.probe import unfitted
 from rebody.jax_settings import own_jax_settings
@@ -216,8 +217,12 @@ def sample_evidence(replay: Episodes, stored, config: MetaConfig, key: PRNGKeyAr
         return jax.tree.map(lambda leaf: leaf[group, episode, time], along)
 
     apart = jnp.abs(seen[:, :, None] - decoded[:, None])
+    heard = at(seen, replay.reward)
+    if config.inference.hears_any_law:
+        whole = replay.reward[group[:, 0], episode[:, 0]]
+        heard = jnp.take_along_axis(normalised(whole), seen, axis=-1)
     return Evidence(
-        window=Transition(at(seen, replay.state), at(seen, replay.reward), at(seen + 1, replay.state)),
+        window=Transition(at(seen, replay.state), heard, at(seen + 1, replay.state)),
         base_task=config.families.base_task(at(seen, replay.task)),
         changed=1 - (1 - config.switch_share / config.decisions) ** apart,
         previous=at(decoded, replay.state),
