@@ -11,7 +11,7 @@ from rebody.evaluation.trial import Trial
 from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import TaskSpec
 
-ROBOTS = pytest.mark.parametrize("name", ["ant", "quadruped"])
+ROBOTS = pytest.mark.parametrize("name", ["ant", "go1", "quadruped"])
 
 
 @ROBOTS
