@@ -14,7 +14,7 @@ from rebody.inference.encoder import Encoder, EncoderCarry
 from rebody.inference.fitting import Evidence, Fit, fit
 from rebody.inference.hypotheses import APART, amounts_of, spread_of
 from rebody.inference.inputs import CIRCULAR, scaled
-from rebody.inference.law import LATEST, PARAMETERS, Kind, Late, begun, kinds_of, prior_of, rewards_by
+from rebody.inference.law import LATEST, PARAMETERS, Kind, Late, Rewards, begun, kinds_of, prior_of, rewards_by
 from rebody.inference.telling import likely_families, proposed, told
 from rebody.inference.thinned import Thinned, nothing_heard
 from rebody.types import AnyArray, Belief, Transition
@@ -53,7 +53,8 @@ class LawHypotheses(eqx.Module):
 class LawMemory(eqx.Module):
     """What is carried from decision to decision."""
 
-    carry: EncoderCarry
+    carry: EncoderCarry | None
+    """Of the encoder; None while one body is looked at alone."""
     heard: Thinned
     experts: tuple[LawHypotheses, ...]
     noise: Float[AnyArray, "*batch"]
@@ -87,13 +88,14 @@ class SharpenedByAnyLaw(eqx.Module):
 
     def step(self, memory: LawMemory, transition: Transition) -> tuple[LawMemory, Belief]:
         """One decision: take in a transition, say what is believed now."""
+        assert memory.carry is not None
         carry, guess = self.encoder.step(memory.carry, transition)
         own = eqx.tree_at(lambda m: m.carry, memory, None)
         one = self._of_one_body
         for _ in guess.mean.shape[:-1]:
             one = jax.vmap(one)
-        states = [self._scaled(state) for state in (transition.previous, transition.state)]
-        own, belief = one(own, guess, *states, jnp.asarray(transition.reward, jnp.float32))
+        previous, state = self._scaled(transition.previous), self._scaled(transition.state)
+        own, belief = one(own, guess, previous, state, jnp.asarray(transition.reward, jnp.float32))
         return eqx.tree_at(lambda m: m.carry, own, carry, is_leaf=lambda leaf: leaf is None), belief
 
     def unheard(self, memory: LawMemory, transition: Transition) -> LawMemory:
@@ -141,9 +143,10 @@ class SharpenedByAnyLaw(eqx.Module):
         evidence = Evidence(
             Late.of(expert, self._read(expert, heard.states)), heard.rewards, heard.weights, jnp.asarray(heard.spread)
         )
+        rewards = Rewards(*heard.ends, evidence.spread)
         somewhere = _somewhere(expert, len(guess), decision)
         places = jnp.repeat(jnp.stack([guess, before.amounts[0], somewhere]), TRIED, axis=0)
-        which = (TRIED * decision + jnp.arange(len(places))) % len(kinds.exponent)
+        which = (TRIED * decision + jnp.arange(len(places))) % jnp.size(kinds.exponent)
         new_kinds = jax.tree.map(lambda column: column[which], kinds)
 
         def begin(kind, amounts):
@@ -153,7 +156,7 @@ class SharpenedByAnyLaw(eqx.Module):
         kind = jax.tree.map(lambda old, new: jnp.concatenate([old, new]), before.kind, new_kinds)
 
         def fitted(kind, start):
-            return fit(expert, evidence, kind, prior_of(kind, len(guess), heard.mean, evidence.spread), start)
+            return fit(expert, evidence, kind, prior_of(expert, len(guess), kind, rewards), start)
 
         ended = jax.vmap(fitted)(kind, starts)
         chosen = _likeliest_apart(ended, kind)
@@ -226,7 +229,7 @@ def _likeliest_apart(ended: Fit, kind: Kind) -> Int[Array, " kept"]:
     return jnp.stack(chosen)
 
 
-def _somewhere(expert: Expert, size: int, decision: Int[AnyArray, ""]) -> Float[Array, " amount"]:
+def _somewhere(expert: Expert, size: int, decision: Int[AnyArray, ""]) -> Float[AnyArray, " amount"]:
     """Amounts of a place that is another one at every decision, evenly all over what an expert may mean."""
     share, turn = (decision * GOLDEN) % 1.0, (decision * GOLDEN**2) % 1.0
     if len(expert.fields) == 1:

@@ -34,15 +34,17 @@ class Thinned(eqx.Module):
     """How many rewards there were, their mean, and their summed squared distance from it (Welford 1962)."""
 
     @property
-    def mean(self) -> Float[Array, "*batch"]:
-        """Of the rewards."""
-        return self.moments[..., 1]
-
-    @property
     def spread(self) -> Float[Array, "*batch"]:
         """Their standard deviation, never 0."""
         count, mean, squared = (self.moments[..., i] for i in range(3))
         return jnp.maximum(jnp.sqrt(squared / jnp.maximum(count, 1)), 1e-3 * jnp.abs(mean) + SMALLEST)
+
+    @property
+    def ends(self) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
+        """The lowest and the highest reward that is kept."""
+        there = self.weights > 0
+        lowest = jnp.min(jnp.where(there, self.rewards, jnp.inf), axis=-1)
+        return lowest, jnp.max(jnp.where(there, self.rewards, -jnp.inf), axis=-1)
 
     def seeing(self, state: Float[AnyArray, " field"]) -> "Thinned":
         """Of one body: after one more state. Before the first it was there all the time."""
@@ -56,8 +58,8 @@ class Thinned(eqx.Module):
         now = eqx.tree_at(lambda t: t.moments, self, moments)
         kept, weights, last = now._room(fields, scales)
         return Thinned(
-            self.states[kept].at[last].set(self.recent),
-            self.rewards[kept].at[last].set(reward),
+            jnp.asarray(self.states)[kept].at[last].set(self.recent),
+            jnp.asarray(self.rewards)[kept].at[last].set(reward),
             weights.at[last].set(1.0),
             self.recent,
             self.has_seen,
@@ -72,7 +74,7 @@ class Thinned(eqx.Module):
         off = off + (rewards[1:] - rewards[:-1]) ** 2
         first, then = self.weights[:-1], self.weights[1:]
         least = jnp.argmin(off * first * then / jnp.maximum(first + then, 1.0))
-        merged = self.weights.at[least + 1].add(self.weights[least])
+        merged = jnp.asarray(self.weights).at[least + 1].add(self.weights[least])
         kept = jnp.where(is_full, jnp.minimum(places + (places >= least), len(places) - 1), places)
         weights = jnp.where(is_full, merged[kept], self.weights)
         return kept, weights, jnp.where(is_full, len(places) - 1, jnp.sum(self.weights > 0))
