@@ -56,9 +56,9 @@ def test_every_command_has_its_help(hook):
     helps = dict(hook("reference").helps())
     assert {"rebody", "rebody demo", "rebody train", "rebody train step-predictor", "rebody list"} <= helps.keys()
     assert all(text.startswith(f"usage: {name}") for name, text in helps.items())
-    assert "--push-every-s" in helps["rebody train tracker cheetah"]
+    (tracker,) = [name for name in helps if name.startswith("rebody train tracker ")]  # one stands for all robots
+    assert "--push-every-s" in helps[tracker]
     assert "hopper" in helps["rebody train tracker"]
-    assert "rebody train tracker hopper" not in helps
 
 
 def test_equations(hook):
