@@ -105,14 +105,22 @@ class SharpenedByAnyLaw(eqx.Module):
         return eqx.tree_at(lambda m: m.heard, memory, one(memory.heard, *states))
 
     def explained(self, memory: LawMemory) -> Float[Array, "*batch"]:
-        """Share of the rewards' variance that the likeliest hypothesis explains.
+        """Share of the variance of the remembered rewards that the likeliest hypothesis explains, in [0, 1].
 
-        Near 1 for a known family and law, near 0 for rewards that no known task pays.
+        Near 1 for a known family and law, near 0 for rewards that no known task pays: so many free parameters explain
+        some of any rewards, which is taken off (the adjusted R^2 of Ezekiel 1930). 0 where there are no more rewards
+        than parameters.
         """
         cost = jnp.stack([each.cost[..., 0] for each in memory.experts], axis=-1)
         noise = jnp.stack([each.noise[..., 0] for each in memory.experts], axis=-1)
-        least = jnp.take_along_axis(noise, jnp.argmin(cost, axis=-1)[..., None], axis=-1)[..., 0]
-        return jnp.clip(1 - (least / memory.heard.spread) ** 2, 0.0, 1.0)
+        free = jnp.asarray([PARAMETERS + len(expert.fields) for expert in self.decoder.experts])
+        best = jnp.argmin(cost, axis=-1)
+        left = jnp.take_along_axis(noise, best[..., None], axis=-1)[..., 0] ** 2 / memory.heard.variance
+        # of rewards that stand for many only the entry itself is new
+        entries = jnp.sum(memory.heard.weights > 0, axis=-1)
+        spare = entries - free[best]
+        share = 1 - left * (entries - 1) / jnp.maximum(spare, 1)
+        return jnp.where(spare > 0, jnp.clip(share, 0.0, 1.0), 0.0)
 
     def _scaled(self, state):
         return scaled(state, self.encoder.fields, self.encoder.scales)
