@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rebody
-from rebody.agents.doubts import RewardWatch
+from rebody.agents.doubts import RewardWatch, _is_beyond
 from rebody.types import global_state
 
 
@@ -67,6 +67,12 @@ def test_a_doubt_is_forgotten_after_a_while(module):
     watch, _ = heard(module, lambda x, i: 7.0 if i == 0 else relative(x, i))
     assert watch.doubts(np.inf)
     assert watch.doubts() == ()
+
+
+@pytest.mark.parametrize(("reward", "beyond"), [(2.4, False), (2.6, True), (0.7, True), (0.8, False), (-0.5, True)])
+def test_rewards_may_be_good(reward, beyond):
+    """Bounds of either sign are let out by a quarter."""
+    assert _is_beyond(reward, (1.0, 2.0)) is beyond
 
 
 def test_beyond_the_trained_range_is_a_note_alone():

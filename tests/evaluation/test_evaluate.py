@@ -22,7 +22,7 @@ from rebody.inference.contract import Contract
 from rebody.inference.mixture.padded import no_mixture
 from rebody.store import tree_hash
 from rebody.store.typed import typed
-from rebody.tasks import FamilySet
+from rebody.tasks import FamilySet, Payment
 from rebody.tasks.line import GOAL, STAND, VELOCITY
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 
@@ -151,6 +151,37 @@ def test_a_point_mass_may_be_another_one_than_the_module_learned_on(trial):
     fast = evaluate(on_the_toy(trial, agent="bayes"), SPECS[:1], 1).episodes[0]
     assert np.abs(np.diff(slow.quantities["x"])).max() <= 0.02 + 1e-5
     assert np.abs(np.diff(fast.quantities["x"])).max() > 0.02 + 1e-3
+
+
+@pytest.mark.parametrize("robot", [True, False])
+def test_how_tasks_are_paid(trial, robot):
+    """Returns are sums of what is earned, of the yardsticks as well; what the agent hears is another matter."""
+    payment = Payment("gaussian", width=4.0, scale=2.0, offset=0.5, noise=0.1, delay_s=0.2, dropped=0.2)
+    own = trial if robot else on_the_toy(trial)
+    paid = evaluate(replace(own, payment=payment), SPECS, SEEDS)
+    for episode in paid.episodes:
+        apart = np.array(episode.quantities["x"]) - np.array(episode.active_target)[:, 0]
+        np.testing.assert_allclose(episode.reward, 2 * np.exp(-((apart / 4) ** 2)) + 0.5, atol=1e-4)
+        assert episode.return_ == pytest.approx(sum(episode.reward), abs=1e-3)
+    assert paid.law == payment
+    for agent in ("oracle", "idle"):
+        told = evaluate(replace(own, payment=payment, agent=agent), SPECS, SEEDS)
+        returns = [getattr(episode, f"{agent}_return") for episode in paid.episodes]
+        assert returns == pytest.approx([episode.return_ for episode in told.episodes], rel=1e-5)
+    assert evaluate(replace(own, payment=payment), SPECS, SEEDS).episodes == paid.episodes
+
+
+def test_a_payment_like_the_families_own_law_changes_nothing(trial, results):
+    assert evaluate(replace(trial, payment=Payment()), SPECS, SEEDS).episodes == results.episodes
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [({"agent": "bayes"}, "'bayes' believes by the families' own laws"), ({"thesis": True}, "leave --law or --thesis")],
+)
+def test_where_no_other_law_can_be(trial, changes, says):
+    with pytest.raises(RebodyError, match=says):
+        evaluate(replace(trial, payment=Payment(), **changes), SPECS, 1)
 
 
 FAR_AND_NEAR = [TaskSpec("goal", (target,)) for target in (-9.0, -3.0, 3.0, 9.0)]

@@ -9,7 +9,7 @@ from rebody.errors import RebodyError
 from rebody.evaluation import Results, read_results, save_results
 from rebody.evaluation.reading import holds_results
 from rebody.ranges import Box
-from rebody.tasks import SHIPPED, FamilySet, Quantity
+from rebody.tasks import SHIPPED, FamilySet, Payment, Quantity
 from rebody.tasks.line import GOAL
 
 VECTORS = ("target", "active_target", "inferred_target", "subgoal")
@@ -35,6 +35,14 @@ def test_what_was_saved_comes_back(results, path):
     assert again.summary == results.summary
 
 
+def test_how_tasks_were_paid_comes_back(results, path, tmp_path):
+    law = Payment("power", True, 3.0, 1.0, exponent=1.5, delay_s=0.3)
+    save_results(replace(results, law=law), tmp_path / "paid.json")
+    assert read_results(tmp_path / "paid.json").law == law
+    _spoil(path, lambda content: content.pop("law"))  # a file of an earlier release
+    assert read_results(path) == results
+
+
 def _spoil(path, spoil):
     content = json.loads(path.read_text())
     spoil(content)
@@ -47,6 +55,7 @@ def _spoil(path, spoil):
         (lambda c: c.pop("episodes"), "holds no results of an evaluation"),
         (lambda c: c.update(version=3), "has version 3; this rebody reads versions 1 to 2"),
         (lambda c: c.update(robot=3), r"\$.robot"),
+        (lambda c: c.update(law={"form": "cubic"}), "'cubic' is unknown"),
         (lambda c: c.update(episodes=[]), "there is no episode"),
         (lambda c: c.update(episodes=[7]), "Expected `object`, got `int`"),
         (lambda c: c["episodes"][0].pop("return"), "return_"),

@@ -14,7 +14,7 @@ from rebody.errors import RebodyError
 from rebody.evaluation import Results, save_results, summary_table
 from rebody.evaluation.results import episode_results
 from rebody.ranges import Box, interval
-from rebody.tasks import SHIPPED, FamilySet, Quantity
+from rebody.tasks import SHIPPED, FamilySet, Payment, Quantity
 from rebody.tasks.line import GOAL as GOALS
 from rebody.tasks.task_file import Switch, TaskSpec, active_tasks
 from rebody.types import Belief, Subgoal, global_state
@@ -28,7 +28,7 @@ SERIES = {
     "inferred_family", "inferred_target", "cluster", "latent", "subgoal_family", "subgoal",
 }  # fmt: skip
 EPISODE = SERIES | {"family", "target", "seed", "quantities", "fell", "return", "oracle_return", "final_error"}
-BESIDE_HEAD = {"tracker", "sharpened"}
+BESIDE_HEAD = {"tracker", "sharpened", "law"}
 BESIDE_EPISODE = {"final_squared_error", "ripple_m_s", "idle_return"}
 DECISIONS = 40
 GOAL, VELOCITY, STAND = (SHIPPED.index(name) for name in ("goal", "velocity", "stand"))
@@ -109,6 +109,13 @@ def test_the_table_shows_each_family_that_occurs(results):
     assert "goal: median error [m]" in text
     assert "100.0 %" in text  # within tolerance
     assert "velocity" not in text
+
+
+def test_the_table_names_a_law_of_payment(results):
+    assert "law" not in shown([results])
+    text = shown([replace(results, law=Payment("gaussian", scale=3.0)), results])
+    assert "gaussian, scale 3" in text
+    assert "each family's own" in text
 
 
 def test_families_of_one_name_share_a_row(results):

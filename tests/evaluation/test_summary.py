@@ -46,6 +46,20 @@ def test_the_share_is_0_for_idle_and_1_for_the_oracle():
     assert share_of_oracle(rows[:, [2, 1, 2]]) == 0.0
 
 
+def test_what_has_no_value_in_a_resample_does_not_count_there():
+    """Nothing is to be gained of two of three tasks, as of sparse rewards that not even the oracle earns."""
+    nothing = [0.0, 0.0, 0.0]
+    found = with_interval(np.array([nothing, [3.0, 4.0, 0.0], [1.0, 4.0, 0.0], nothing]), share_of_oracle)
+    assert found["value"] == 0.5
+    assert (found["low"], found["high"]) == (0.25, 0.75)
+
+
+def test_there_is_no_regret_of_nothing(result):
+    earned = [result(target=target, oracle_return=oracle) for target, oracle in ((1.0, 2.0), (2.0, -2.0))]
+    assert summarise(earned)["regret"] is None
+    assert summarise(earned)["share"] is not None
+
+
 def test_seeds_are_told_apart(result):
     episodes = [result(target=t, seed=seed, final_error=t + seed) for t in (1.0, 2.0, 4.0) for seed in (0, 1)]
     summary = summarise(episodes)

@@ -132,4 +132,5 @@ def _moved(quantity: Quantity, previous: GlobalState, state: GlobalState) -> End
 
 def _is_beyond(reward: float, bounds: tuple[float, float]) -> bool:
     worst, best = bounds
-    return not SLACK * worst - TOLERANCE <= reward <= best / SLACK + TOLERANCE
+    lowest, highest = min(SLACK * worst, worst / SLACK), max(SLACK * best, best / SLACK)
+    return not lowest - TOLERANCE <= reward <= highest + TOLERANCE

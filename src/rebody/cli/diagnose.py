@@ -35,6 +35,8 @@ class Diagnose:
         """Evaluate all, print tables, draw."""
         if self.trial.agent != "reuse" or self.trial.thesis:
             raise RebodyError("a diagnosis is of `reuse` in its own time: leave --agent and --thesis out.")
+        if self.trial.law is not None:
+            raise RebodyError("a diagnosis needs `bayes`, which believes by the families' own laws: leave --law out.")
         check_output(self.figure, "--figure", PICTURES, inputs=(self.tasks,))
         if self.out is not None:
             for agent in LADDER:

@@ -13,7 +13,7 @@ from rebody.cli.trial import TrialOptions
 from rebody.errors import RebodyError
 from rebody.evaluation import evaluate
 from rebody.evaluation.episode import EpisodeResult
-from rebody.evaluation.listening import listen
+from rebody.evaluation.listening import listen_beside
 from rebody.evaluation.trial import Trial
 from rebody.report import film, plot_episode
 from rebody.report.page.tables import vector
@@ -42,7 +42,7 @@ class RunTask:
             raise RebodyError("there is no video of a point mass; use --figure.")
         episode = evaluate(trial, [spec], 1).episodes[0] if self.video is None else shoot(trial, spec, self.video)
         if self.figure is not None:
-            plot_episode(episode, self.figure, listen(trial.inference, episode, trial.sharpens))
+            plot_episode(episode, self.figure, listen_beside(trial, episode))
         Console().print(describe(episode), highlight=False)
 
 

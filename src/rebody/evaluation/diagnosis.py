@@ -142,7 +142,7 @@ def _conditions(results: Results) -> Hashable:
     """What agents of one ladder have in common."""
     tasks = tuple((e.task, e.seed, len(e.time_s)) for e in results.episodes)
     parts = (results.robot, results.inference, results.tracker, *sorted(results.frozen.values()))
-    return parts, results.stride, results.horizon, tasks
+    return parts, results.law, results.stride, results.horizon, tasks
 
 
 def _culprit(episode: EpisodeResult, on_exact: EpisodeResult | None) -> str:

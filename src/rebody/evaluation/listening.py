@@ -7,6 +7,7 @@ import numpy as np
 from rebody.agents.belief import Reading
 from rebody.agents.parts import Inference
 from rebody.evaluation.episode import EpisodeResult
+from rebody.evaluation.trial import Trial
 from rebody.types import DECISION_DT, RATE_OF
 
 
@@ -18,6 +19,11 @@ def listen(inference: Inference, episode: EpisodeResult, sharpen: bool) -> list[
     states = [{field: float(series[i]) for field, series in seen.items()} for i in range(len(episode.time_s))]
     belief = inference.begin(_before(states[0]), sharpen)
     return [belief.update(state, reward) for state, reward in zip(states, episode.reward, strict=True)]
+
+
+def listen_beside(trial: Trial, episode: EpisodeResult) -> list[Reading] | None:
+    """`listen` as a trial's agent does; None also where a law of payment is between what is earned and heard."""
+    return None if trial.payment else listen(trial.inference, episode, trial.sharpens)
 
 
 def _seen(episode: EpisodeResult) -> dict[str, Any]:

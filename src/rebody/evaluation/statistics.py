@@ -1,5 +1,6 @@
 """Statistics with their bootstrap intervals."""
 
+import warnings
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Sequence
 from typing import Any
@@ -11,15 +12,17 @@ RESAMPLES = 2000
 
 
 def regret(returns: np.ndarray) -> float:
-    """Of rows (return, oracle return)."""
+    """Of rows (return, oracle return); NaN where nothing can be earned."""
     reached, possible = returns.sum(axis=0)
-    return float((possible - reached) / abs(possible))
+    return float((possible - reached) / abs(possible)) if possible else np.nan
 
 
 def share_of_oracle(returns: np.ndarray) -> float:
-    """Of rows (return, oracle return, idle return): how much of what knowing the task brings, 0 to 1."""
+    """Of rows (return, oracle return, idle return): how much of what knowing the task brings, 0 to 1; NaN where that is
+    nothing.
+    """
     reached, possible, nothing = returns.sum(axis=0)
-    return float((reached - nothing) / (possible - nothing))
+    return float((reached - nothing) / (possible - nothing)) if possible != nothing else np.nan
 
 
 def percentile_95(values: np.ndarray) -> float:
@@ -38,15 +41,20 @@ def with_interval(values: Any, statistic: Any, tasks: Sequence[Hashable] | None 
     of_tasks = _rows_of_tasks(range(len(values)) if tasks is None else tasks)
     if len(of_tasks) < 2 or np.ptp(values, axis=0).max() == 0:
         return {"value": value, "low": value, "high": value}
-    interval = scipy.stats.bootstrap(
-        (np.arange(len(of_tasks)),),
-        lambda chosen: statistic(values[np.concatenate([of_tasks[i] for i in chosen])]),
-        n_resamples=RESAMPLES,
-        vectorized=False,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return {"value": value, "low": float(interval.low), "high": float(interval.high)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", scipy.stats.DegenerateDataWarning)  # some resamples have no value
+        resampled = scipy.stats.bootstrap(
+            (np.arange(len(of_tasks)),),
+            lambda chosen: statistic(values[np.concatenate([of_tasks[i] for i in chosen])]),
+            n_resamples=RESAMPLES,
+            vectorized=False,
+            method="percentile",
+            rng=np.random.default_rng(0),
+        )
+    low, high = resampled.confidence_interval
+    if np.isnan(low):  # of those that have a value
+        low, high = np.nanpercentile(resampled.bootstrap_distribution, (2.5, 97.5))
+    return {"value": value, "low": float(low), "high": float(high)}
 
 
 def _rows_of_tasks(tasks: Iterable[Hashable]) -> list[list[int]]:

@@ -52,7 +52,9 @@ def _regret(episodes: Sequence[EpisodeResult]) -> dict[str, float] | None:
     """(oracle return - return) / |oracle return|, each summed over episodes."""
     if any(episode.oracle_return is None for episode in episodes):
         return None
-    returns = [[episode.return_, episode.oracle_return] for episode in episodes]
+    returns = np.array([[episode.return_, episode.oracle_return] for episode in episodes], float)
+    if np.isclose(returns[:, 1].sum(), 0.0):
+        return None
     return with_interval(returns, regret, [episode.task for episode in episodes])
 
 

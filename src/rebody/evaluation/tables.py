@@ -31,6 +31,8 @@ def summary_table(results: Sequence[Results]) -> Table:
     table.add_column("")
     for result in results:
         table.add_column(f"{result.robot}, {result.agent}", justify="right")
+    if any(result.law for result in results):
+        table.add_row("law", *(result.law.in_short if result.law else "each family's own" for result in results))
     for family in {family.name: family for result in results for family in result.families}.values():
         ofs = [summary["families"].get(family.name, {}) for summary in summaries]
         table.add_row(f"{family.name}: episodes", *(str(of.get("episodes", 0)) for of in ofs))

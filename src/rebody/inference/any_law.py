@@ -14,7 +14,7 @@ from rebody.inference.encoder import Encoder, EncoderCarry
 from rebody.inference.fitting import Evidence, Fit, fit
 from rebody.inference.hypotheses import APART, amounts_of, spread_of
 from rebody.inference.inputs import CIRCULAR, scaled
-from rebody.inference.law import LATEST, PARAMETERS, Kind, Late, begun, kinds_of, prior_of, rewards_by
+from rebody.inference.law import LATEST, PARAMETERS, Kind, Late, Rewards, begun, kinds_of, prior_of, rewards_by
 from rebody.inference.telling import likely_families, proposed, told
 from rebody.inference.thinned import Thinned, nothing_heard
 from rebody.types import AnyArray, Belief, Transition
@@ -149,6 +149,7 @@ class SharpenedByAnyLaw(eqx.Module):
         evidence = Evidence(
             Late.of(expert, self._read(expert, heard.states)), heard.rewards, heard.weights, jnp.asarray(heard.spread)
         )
+        rewards = Rewards(*heard.ends, evidence.spread)
         somewhere = _somewhere(expert, len(guess), decision)
         places = jnp.repeat(jnp.stack([guess, before.amounts[0], somewhere]), TRIED, axis=0)
         which = (TRIED * decision + jnp.arange(len(places))) % len(kinds.exponent)
@@ -161,7 +162,7 @@ class SharpenedByAnyLaw(eqx.Module):
         kind = jax.tree.map(lambda old, new: jnp.concatenate([old, new]), before.kind, new_kinds)
 
         def fitted(kind, start):
-            return fit(expert, evidence, kind, prior_of(kind, len(guess), heard.mean, evidence.spread), start)
+            return fit(expert, evidence, kind, prior_of(expert, len(guess), kind, rewards), start)
 
         ended = jax.vmap(fitted)(kind, starts)
         chosen = _likeliest_apart(ended, kind)

@@ -22,6 +22,8 @@ LATEST = 3
 PARAMETERS = 5
 """Offset, log-scale, exponent, log-width, delay: they stand before the amounts of an expert."""
 OFFSET, LOG_SCALE, EXPONENT, LOG_WIDTH, DELAY = range(PARAMETERS)
+FAR = 1.0
+"""Standard deviation of places, in units of the encoder's scales."""
 TINY = 1e-8
 STEEP = 30.0
 """How sharp the corner of a clipped law is."""
@@ -102,14 +104,28 @@ class LawPrior(NamedTuple):
     deviation: Float[AnyArray, " parameter"]
 
 
-def prior_of(kind: Kind, amounts: int, mean: Float[AnyArray, ""], spread: Float[AnyArray, ""]) -> LawPrior:
-    """What is likely before rewards of this mean and spread are looked at one by one: laws of a kind, and amounts as
-    the module has them before anything is heard (thesis 5.6)."""
-    means = [mean, jnp.log(spread) + 0.5, kind.exponent, kind.log_width, 0.0]
-    deviations = [5 * spread, 1.5, kind.exponent_std, kind.log_width_std, 0.7]
+class Rewards(NamedTuple):
+    """What rewards are like, before they are looked at one by one."""
+
+    lowest: Float[AnyArray, ""]
+    highest: Float[AnyArray, ""]
+    spread: Float[AnyArray, ""]
+
+
+def prior_of(expert: Expert, amounts: int, kind: Kind, rewards: Rewards) -> LawPrior:
+    """What is likely of a law of that kind, and of a place.
+
+    More can be had than was had so far: who took the best reward that was heard for the best there is would stop on a
+    slope, wherever he is. Places are as far off as the encoder's scales.
+    """
+    span = rewards.highest - rewards.lowest + rewards.spread
+    means = [rewards.highest + 0.5 * span, jnp.log(rewards.spread) + 0.5, kind.exponent, kind.log_width, 0.0]
+    deviations = [span, 1.5, kind.exponent_std, kind.log_width_std, 0.7]
+    weights = expert.reference.weights[0]
+    far = FAR * jnp.sqrt(min(weights.shape)) / jnp.sqrt(jnp.sum(weights**2))
     return LawPrior(
         jnp.concatenate([jnp.stack(jnp.broadcast_arrays(*map(jnp.asarray, means))), jnp.zeros(amounts)]),
-        jnp.concatenate([jnp.stack(jnp.broadcast_arrays(*map(jnp.asarray, deviations))), jnp.ones(amounts)]),
+        jnp.concatenate([jnp.stack(jnp.broadcast_arrays(*map(jnp.asarray, deviations))), jnp.full(amounts, far)]),
     )
 
 

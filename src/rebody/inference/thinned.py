@@ -34,11 +34,6 @@ class Thinned(eqx.Module):
     """How many rewards there were, their mean, and their summed squared distance from it (Welford 1962)."""
 
     @property
-    def mean(self) -> Float[Array, "*batch"]:
-        """Of the rewards."""
-        return self.moments[..., 1]
-
-    @property
     def spread(self) -> Float[Array, "*batch"]:
         """Their standard deviation, never 0."""
         count, mean, squared = (self.moments[..., i] for i in range(3))
@@ -56,6 +51,13 @@ class Thinned(eqx.Module):
         mean = jnp.sum(self.weights * self.rewards, axis=-1) / count
         squared = jnp.sum(self.weights * (self.rewards - mean[..., None]) ** 2, axis=-1) / count
         return jnp.maximum(squared, (1e-3 * jnp.abs(mean) + SMALLEST) ** 2)
+
+    @property
+    def ends(self) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
+        """The lowest and the highest reward that is kept."""
+        there = self.weights > 0
+        lowest = jnp.min(jnp.where(there, self.rewards, jnp.inf), axis=-1)
+        return lowest, jnp.max(jnp.where(there, self.rewards, -jnp.inf), axis=-1)
 
     def seeing(self, state: Float[AnyArray, " field"]) -> "Thinned":
         """Of one body: after one more state. Before the first it was there all the time."""

@@ -21,7 +21,7 @@ from rebody.bodies.camera import Camera, Colour, Pole
 from rebody.errors import RebodyError
 from rebody.evaluation.episode import EpisodeResult
 from rebody.evaluation.evaluate import evaluate
-from rebody.evaluation.listening import listen
+from rebody.evaluation.listening import listen_beside
 from rebody.evaluation.trial import Trial
 from rebody.report.figures import draw_progress
 from rebody.report.plane import draw_map, path_of
@@ -67,7 +67,7 @@ def film(trial: Trial, spec: TaskSpec, path: Path, on_progress: Callable[[float]
     if path_of(episode) is None:
         look = Look(WIDTH, HEIGHT, False, lambda until: _plot(episode, until), 0)
     else:
-        readings = listen(trial.inference, episode, trial.sharpens)
+        readings = listen_beside(trial, episode)
         look = Look(MAP, MAP, True, lambda until: map_picture(episode, readings, until, MAP), 1)
     frames = _frames(trial.robot, poses, episode, look)
     first = next(frames)  # before ffmpeg, which complains where it gets none

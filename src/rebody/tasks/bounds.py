@@ -22,12 +22,15 @@ def payable(family: Family, moved: tuple[Vector, Vector], targets: Box | None = 
     """The worst and the best reward of a decision, over the targets of a range; None for any target.
 
     `moved` are the ends between which the family's quantity was meanwhile [m, m/s, rad]. Of an angle, which may be near
-    a target the other way round, and of vectors, the bounds are wider than they need be.
+    a target the other way round, of vectors, and of laws that measure along the target, the bounds are wider than they
+    need be.
     """
     law, ends = family.reward_law, np.sort(np.stack(moved), axis=0)
     first, last = (np.full(family.size, -_FAR), np.full(family.size, _FAR))
     if targets is not None:
         first, last = np.asarray(targets.low, float), np.asarray(targets.high, float)
+    if law.measure == "along":
+        return _of_ways(family, ends, first, last)
     lowest, highest = (_of_numbers if family.size == 1 else _of_vectors)(family, ends, first, last)
     is_met = any(family.quantity.wraps) or bool(np.all(np.maximum(ends[0], first) <= np.minimum(ends[1], last)))
     best = float(law.pay(np.zeros(1), np.array([family.floor])).max()) if is_met else highest
@@ -61,9 +64,20 @@ def _of_vectors(family: Family, ends: Ends, first: Vector, last: Vector) -> tupl
     longest = float(np.linalg.norm(np.maximum(np.abs(first), np.abs(last))))
     lengths = np.clip([shortest, longest, family.floor, reach + gap], shortest, longest)
     scale, law = np.maximum(lengths, family.floor), family.reward_law
-    lowest = law.pay(np.minimum(lengths + reach, most), scale)
+    most_of_length = family.size**0.5 if law.measure == "l1" else 1.0
+    lowest = law.pay(most_of_length * np.minimum(lengths + reach, most), scale)
     highest = law.pay(np.maximum(lengths - reach, gap), scale)
     return float(np.min(lowest)), float(np.max(highest))
+
+
+def _of_ways(family: Family, ends: Ends, first: Vector, last: Vector) -> tuple[float, float]:
+    """Along whichever way, no more counts than there is in all; an angle is told within half a turn of its target."""
+    largest = np.maximum(np.abs(first), np.abs(last))
+    reached = np.where(family.quantity.wraps, math.pi + largest, np.abs(ends).max(axis=0))
+    reach, shortest, longest = length(reached), length(np.clip(0.0, first, last)), length(largest)
+    scale = np.maximum([shortest, longest], family.floor)
+    pay = family.reward_law.pay(np.array([[-reach], [reach]]), scale)
+    return float(np.min(pay)), float(np.max(pay))
 
 
 def _apart(family: Family, asked: Any, reached: Any) -> Any:

@@ -12,7 +12,7 @@ as a TOML file, or the same as a `Payment` in Python. A new form is one entry in
 
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
@@ -87,6 +87,13 @@ class Payment:
             raise ValueError(f"form: '{self.form}' is unknown; there are {', '.join(FORMS)}")
         if abs(self.delay_s / DECISION_DT - round(self.delay_s / DECISION_DT)) > 1e-6:
             raise ValueError(f"delay_s: {self.delay_s:g} is no multiple of a decision of {DECISION_DT} s")
+
+    @property
+    def in_short(self) -> str:
+        """Form, and what else is not as it is by default."""
+        _, *others = ((field.name, getattr(self, field.name), field.default) for field in fields(self))
+        said = [name if value is True else f"{name} {value:g}" for name, value, default in others if value != default]
+        return ", ".join([self.form, *said])
 
     @property
     def delay(self) -> int:

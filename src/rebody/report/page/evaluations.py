@@ -33,7 +33,8 @@ def settings_of(results: Results) -> dict[str, Any]:
     )
     seconds = max(episode.time_s[-1] for episode in results.episodes)
     seeds = len({episode.seed for episode in results.episodes})
-    return {name: getattr(results, name) for name in names} | {
+    law = {"law": results.law.in_short} if results.law else {}
+    return {name: getattr(results, name) for name in names} | law | {
         "episodes": len(results.episodes), "seeds": seeds, "seconds": seconds,
     }  # fmt: skip
 
