@@ -104,6 +104,12 @@ class LiveBelief:
         self._previous = now
         return self._reading
 
+    @property
+    def is_unknown(self) -> bool:
+        """Whether no task that the module knows explains the rewards: of sharpened beliefs, by modules that hear any
+        law."""
+        return self._explained is not None and self._explained.is_unknown
+
     def doubts(self, within_s: float = RECENT_S) -> tuple[str, ...]:
         """Sentences about rewards of the last seconds that no task could have paid, and that were not believed; of a
         module that hears any law, about rewards that no task explains."""

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from rebody.inference.decoder import Decoder, Expert
 from rebody.inference.encoder import Encoder, EncoderCarry
-from rebody.inference.fitting import Evidence, Fit, fit
+from rebody.inference.fitting import Evidence, Fit, fit, share_explained
 from rebody.inference.hypotheses import APART, amounts_of, spread_of
 from rebody.inference.inputs import CIRCULAR, scaled
 from rebody.inference.law import LATEST, PARAMETERS, Kind, Late, Rewards, begun, kinds_of, prior_of, rewards_by
@@ -107,20 +107,16 @@ class SharpenedByAnyLaw(eqx.Module):
     def explained(self, memory: LawMemory) -> Float[Array, "*batch"]:
         """Share of the variance of the remembered rewards that the likeliest hypothesis explains, in [0, 1].
 
-        Near 1 for a known family and law, near 0 for rewards that no known task pays: so many free parameters explain
-        some of any rewards, which is taken off (the adjusted R^2 of Ezekiel 1930). 0 where there are no more rewards
-        than parameters.
+        Near 1 for a known family and law, near 0 for rewards that no known task pays (`share_explained`).
         """
         cost = jnp.stack([each.cost[..., 0] for each in memory.experts], axis=-1)
         noise = jnp.stack([each.noise[..., 0] for each in memory.experts], axis=-1)
         free = jnp.asarray([PARAMETERS + len(expert.fields) for expert in self.decoder.experts])
         best = jnp.argmin(cost, axis=-1)
-        left = jnp.take_along_axis(noise, best[..., None], axis=-1)[..., 0] ** 2 / memory.heard.variance
-        # of rewards that stand for many only the entry itself is new
+        least = jnp.take_along_axis(noise, best[..., None], axis=-1)[..., 0]
+        # an entry that stands for many rewards is one number still
         entries = jnp.sum(memory.heard.weights > 0, axis=-1)
-        spare = entries - free[best]
-        share = 1 - left * (entries - 1) / jnp.maximum(spare, 1)
-        return jnp.where(spare > 0, jnp.clip(share, 0.0, 1.0), 0.0)
+        return share_explained(least, memory.heard.variance, entries, free[best])
 
     def _scaled(self, state):
         return scaled(state, self.encoder.fields, self.encoder.scales)
