@@ -1,8 +1,12 @@
-"""Small robots that walk (or roll) by ONNX policies of our own."""
+"""Small robots that walk (or roll) by ONNX policies of our own, and those that ship."""
 
 from pathlib import Path
 
 import numpy as np
+import pytest
+
+from rebody.bodies import RobotSpec, load_robot
+from rebody.bodies.source import is_there
 
 CART = """
 <mujoco model="cart">
@@ -104,3 +108,11 @@ def write_cart(folder: Path, toml: str = CART_TOML) -> Path:
     wheels = np.array([[1.0, 1.0], [0.0, 0.0], [-HALF_TRACK, HALF_TRACK]]) / RADIUS
     write_linear(folder / "cart.onnx", wheels)
     return folder / "cart.toml"
+
+
+def robot_that_is_there(name: str) -> RobotSpec:
+    """A shipped robot; a test is skipped where the package that has its model is not installed."""
+    spec = load_robot(name)
+    if not is_there(spec.mjcf):
+        pytest.skip(f"the model of '{name}' comes with the extra robots")
+    return spec

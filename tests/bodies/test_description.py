@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.walking import robot_that_is_there
 
 from rebody.bodies import RobotBatch, load_robot, shipped_robots
 from rebody.bodies.robot import Fall
@@ -15,12 +16,12 @@ ANT = Path(__file__).parents[2] / "examples" / "ant" / "ant.toml"
 
 
 def test_these_robots_are_shipped():
-    assert shipped_robots() == ("cheetah", "hopper", "quadruped", "walker")
+    assert shipped_robots() == ("ant", "berkeley", "cheetah", "go1", "hopper", "quadruped", "walker")
 
 
 @pytest.mark.parametrize("name", [*shipped_robots(), str(ANT)])
 def test_a_described_robot_can_be_used(name):
-    spec = load_robot(name)
+    spec = robot_that_is_there(name)
     assert spec.name == Path(name).stem
     assert spec.steps_per_decision * spec.control_dt == pytest.approx(0.1)
     speed = next(box for family, box in spec.reach if family.startswith("velocity"))
@@ -165,5 +166,5 @@ def test_a_model_that_cannot_be_used_is_named(write_own, toml, mjcf, says):
 
 
 def test_an_unknown_name_is_no_path():
-    with pytest.raises(RebodyError, match=r"Did you mean 'hopper'\?.*cheetah, hopper, quadruped, walker, or the path"):
+    with pytest.raises(RebodyError, match=r"Did you mean 'hopper'\?.*go1, hopper, quadruped, walker, or the path"):
         load_robot("hoper")

@@ -10,6 +10,7 @@ import pytest
 
 from rebody.bodies import RobotBatch, load_robot
 from rebody.bodies.robot import wrap_angle
+from rebody.bodies.source import model_file
 from rebody.control.places import reachable
 from rebody.errors import RebodyError
 from rebody.ranges import interval
@@ -230,7 +231,7 @@ def centre_of_mass_velocity(batch, qvel):
 
 def thrown(spec, steps):
     """x, z and pitch, and all other joints, after each control step of the body itself and of the one held."""
-    free = mujoco.MjModel.from_xml_path(str(spec.mjcf))
+    free = mujoco.MjModel.from_xml_path(str(model_file(spec.mjcf, spec.name)))
     data, batch = mujoco.MjData(free), RobotBatch(spec, 1, threads=1)
     batch.reset(np.random.default_rng(0))
     batch.qpos[:], batch.qvel[:] = spec.model.qpos0, 0.0

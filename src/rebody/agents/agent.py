@@ -97,11 +97,11 @@ class Agent(eqx.Module):
         every `stride`-th.
         """
         transition = Transition(carry.previous, observation.reward, observation.state)
-        taken_in = self.inferrer.step(carry.memory, transition)
+        memory, belief = self.inferrer.step(carry.memory, transition)
         if observation.heard is not None:
             missed = self.inferrer.unheard(carry.memory, transition), carry.belief
-            taken_in = _chosen(observation.heard, taken_in, missed)
-        return self._speak(carry, *taken_in, observation.state)
+            memory, belief = _chosen(observation.heard, (memory, belief), missed)
+        return self._speak(carry, memory, belief, observation.state)
 
     def pass_over(self, carry: Carry, state: GlobalState) -> tuple[Carry, Command]:
         """A decision before which no reward was heard: the belief stays as it is, time goes on."""

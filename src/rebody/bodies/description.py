@@ -9,12 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import msgspec
 
 from rebody import inputs
 from rebody.bodies.model import Space
 from rebody.bodies.robot import Fall, Reach, RobotSpec
+from rebody.bodies.source import source
 from rebody.bodies.walking.joystick import NAVIGATED_M, Joystick
 from rebody.bodies.walking.settings import Phase, Term, Walking
 from rebody.bodies.walking.trained import TrainedPolicy
@@ -23,8 +23,6 @@ from rebody.names import ROBOTS, shipped_robots
 from rebody.ranges import Box
 from rebody.store.files import TEXT, read_file
 
-GYMNASIUM_ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
-GYMNASIUM_PREFIX = "gymnasium:"
 MEASURED = ("dead", "drift", "at_once", "rate")
 """What `rebody robot check` tells of a joystick, and training of one that is learned here."""
 
@@ -118,7 +116,7 @@ def _read(path: Path) -> RobotSpec:
         raise RebodyError(f"'{path}' does not describe a robot: {error}. See docs/own-robot.md.") from error
     spec = RobotSpec(
         name=path.stem,
-        mjcf=_mjcf(description.mjcf, path),
+        mjcf=source(_with_variables(description.mjcf, path), path.parent),
         walking=description.policy and _walking(description.policy, path),
         frame_skip=description.frame_skip,
         root=_root(description.root, path),
@@ -139,12 +137,6 @@ def _read(path: Path) -> RobotSpec:
 def _goal_ahead(description: _Description) -> float:
     """A navigator knows no farther places."""
     return min(description.goal_ahead, math.inf if description.policy is None else NAVIGATED_M)
-
-
-def _mjcf(mjcf: str, path: Path) -> Path:
-    if mjcf.startswith(GYMNASIUM_PREFIX):
-        return GYMNASIUM_ASSETS / mjcf.removeprefix(GYMNASIUM_PREFIX)
-    return path.parent / _with_variables(mjcf, path)
 
 
 def _with_variables(said: str, path: Path) -> str:

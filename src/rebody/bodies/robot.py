@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -14,6 +13,7 @@ from rebody.bodies.attitude import wrap_angle as wrap_angle  # where others look
 from rebody.bodies.control_step import steps_per_decision
 from rebody.bodies.model import PLANE_JOINTS, Compiled, Space, compile_model
 from rebody.bodies.readout import HINGE, SLIDE, FreeReadout, PlanarReadout, Readout
+from rebody.bodies.source import Source, model_file
 from rebody.bodies.walking import Walking
 from rebody.bodies.walking.joystick import NAVIGATOR_SEES, WAYS
 from rebody.errors import RebodyError
@@ -44,7 +44,8 @@ class RobotSpec:
     """A robot: its model, its control rate and its observation mapping (thesis 5.7)."""
 
     name: str
-    mjcf: Path
+    mjcf: Source
+    """Where its model is."""
     frame_skip: int
     """Simulation steps of one control step."""
     root: tuple[str, str, str] | str
@@ -76,7 +77,8 @@ class RobotSpec:
     @cached_property
     def compiled(self) -> Compiled:
         """The compiled model and what came with it; RebodyError where MuJoCo cannot use it."""
-        return compile_model(self.name, self.mjcf, self.root, self.space, self.timestep, self.keyframe)
+        mjcf = model_file(self.mjcf, self.name)
+        return compile_model(self.name, mjcf, self.root, self.space, self.timestep, self.keyframe)
 
     @property
     def model(self) -> mujoco.MjModel:

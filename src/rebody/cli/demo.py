@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rebody.bodies import load_robot, shipped_robots
+from rebody.bodies.source import is_there
 from rebody.cli.demo_tasks import hidden_tasks, shown_task
 from rebody.cli.output import check_output
 from rebody.cli.run import describe, shoot
@@ -82,13 +83,14 @@ def robots_of_the_line() -> list[str]:
 
 
 def walking_robots() -> list[str]:
-    """Robots that walk by a policy which ships."""
+    """Robots that walk by a policy which ships, and whose model is installed."""
     return [robot for robot in _with_tracker() if load_robot(robot).walking is not None]
 
 
 def _with_tracker() -> list[str]:
     shipped = {name for name, _ in shipped_artifacts()}
-    return [robot for robot in shipped_robots() if f"tracker-{robot}" in shipped]
+    robots = [robot for robot in shipped_robots() if f"tracker-{robot}" in shipped]
+    return [robot for robot in robots if is_there(load_robot(robot).mjcf)]
 
 
 def _table(reuse: Results, oracle: Results, idle: Results, seconds: float) -> Table:

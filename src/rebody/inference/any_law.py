@@ -53,7 +53,8 @@ class LawHypotheses(eqx.Module):
 class LawMemory(eqx.Module):
     """What is carried from decision to decision."""
 
-    carry: EncoderCarry
+    carry: EncoderCarry | None
+    """Of the encoder; None while one body is looked at alone."""
     heard: Thinned
     experts: tuple[LawHypotheses, ...]
     noise: Float[AnyArray, "*batch"]
@@ -87,13 +88,14 @@ class SharpenedByAnyLaw(eqx.Module):
 
     def step(self, memory: LawMemory, transition: Transition) -> tuple[LawMemory, Belief]:
         """One decision: take in a transition, say what is believed now."""
+        assert memory.carry is not None
         carry, guess = self.encoder.step(memory.carry, transition)
         own = eqx.tree_at(lambda m: m.carry, memory, None)
         one = self._of_one_body
         for _ in guess.mean.shape[:-1]:
             one = jax.vmap(one)
-        states = [self._scaled(state) for state in (transition.previous, transition.state)]
-        own, belief = one(own, guess, *states, jnp.asarray(transition.reward, jnp.float32))
+        previous, state = self._scaled(transition.previous), self._scaled(transition.state)
+        own, belief = one(own, guess, previous, state, jnp.asarray(transition.reward, jnp.float32))
         return eqx.tree_at(lambda m: m.carry, own, carry, is_leaf=lambda leaf: leaf is None), belief
 
     def unheard(self, memory: LawMemory, transition: Transition) -> LawMemory:
@@ -148,7 +150,7 @@ class SharpenedByAnyLaw(eqx.Module):
         rewards = Rewards(*heard.ends, evidence.spread)
         somewhere = _somewhere(expert, len(guess), decision)
         places = jnp.repeat(jnp.stack([guess, before.amounts[0], somewhere]), TRIED, axis=0)
-        which = (TRIED * decision + jnp.arange(len(places))) % len(kinds.exponent)
+        which = (TRIED * decision + jnp.arange(len(places))) % jnp.size(kinds.exponent)
         new_kinds = jax.tree.map(lambda column: column[which], kinds)
 
         def begin(kind, amounts):
@@ -231,7 +233,7 @@ def _likeliest_apart(ended: Fit, kind: Kind) -> Int[Array, " kept"]:
     return jnp.stack(chosen)
 
 
-def _somewhere(expert: Expert, size: int, decision: Int[AnyArray, ""]) -> Float[Array, " amount"]:
+def _somewhere(expert: Expert, size: int, decision: Int[AnyArray, ""]) -> Float[AnyArray, " amount"]:
     """Amounts of a place that is another one at every decision, evenly all over what an expert may mean."""
     share, turn = (decision * GOLDEN) % 1.0, (decision * GOLDEN**2) % 1.0
     if len(expert.fields) == 1:

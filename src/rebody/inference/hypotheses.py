@@ -174,7 +174,7 @@ def all_over(expert: Expert, size: int) -> Float[AnyArray, "start amount"]:
     return amounts_of(expert, jnp.asarray(places, jnp.float32))
 
 
-def amounts_of(expert: Expert, place: Float[AnyArray, "*batch own"]) -> Float[Array, "*batch amount"]:
+def amounts_of(expert: Expert, place: Float[AnyArray, "*batch own"]) -> Float[AnyArray, "*batch amount"]:
     """The smallest amounts that mean a place, scaled as the encoder's fields."""
     inputs = seen(place, expert.fields, expert.scales)
     return (inputs - expert.reference.biases[0]) @ jnp.linalg.pinv(expert.reference.weights[0])

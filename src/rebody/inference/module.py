@@ -180,7 +180,7 @@ def loss(
 
 def _unexplained(
     module: InferenceModule,
-    latent: Float[Array, "batch time latent"],
+    latent: Float[AnyArray, "batch time latent"],
     after: Float[AnyArray, "batch decoded field"],
     evidence: Evidence,
 ) -> tuple[Float[Array, ""], Float[Array, ""]]:
@@ -197,7 +197,7 @@ def _unexplained(
 
 def _unexplained_by_any_law(
     module: InferenceModule,
-    latent: Float[Array, "batch time latent"],
+    latent: Float[AnyArray, "batch time latent"],
     after: Float[AnyArray, "batch decoded field"],
     evidence: Evidence,
 ) -> tuple[Float[Array, ""], Float[Array, ""]]:

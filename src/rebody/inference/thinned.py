@@ -71,8 +71,8 @@ class Thinned(eqx.Module):
         now = eqx.tree_at(lambda t: t.moments, self, moments)
         kept, weights, last = now._room(fields, scales)
         return Thinned(
-            self.states[kept].at[last].set(self.recent),
-            self.rewards[kept].at[last].set(reward),
+            jnp.asarray(self.states)[kept].at[last].set(self.recent),
+            jnp.asarray(self.rewards)[kept].at[last].set(reward),
             weights.at[last].set(1.0),
             self.recent,
             self.has_seen,
@@ -87,7 +87,7 @@ class Thinned(eqx.Module):
         off = off + (rewards[1:] - rewards[:-1]) ** 2
         first, then = self.weights[:-1], self.weights[1:]
         least = jnp.argmin(off * first * then / jnp.maximum(first + then, 1.0))
-        merged = self.weights.at[least + 1].add(self.weights[least])
+        merged = jnp.asarray(self.weights).at[least + 1].add(self.weights[least])
         kept = jnp.where(is_full, jnp.minimum(places + (places >= least), len(places) - 1), places)
         weights = jnp.where(is_full, merged[kept], self.weights)
         return kept, weights, jnp.where(is_full, len(places) - 1, jnp.sum(self.weights > 0))

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 from jaxtyping import Float
 
@@ -64,7 +65,9 @@ class JointBatch(GaitBatch):
         """RebodyError for a robot whose description says nothing of a policy."""
         super().__init__(spec, size, threads, joint_interface(spec))
         self.actions = len(self.joints.names)
-        self._feet, self._geoms = feet_of(spec), self._batch.bind("geom_xpos")
+        self._geoms, self._turned = self._batch.bind("geom_xpos"), self._batch.bind("geom_xmat")
+        self._feet = feet_of(spec)
+        self._extent, self._round = extents(spec.model, self._feet)
 
     def step(self, actions):
         """Joint targets, for a control step."""
@@ -79,8 +82,10 @@ class JointBatch(GaitBatch):
     @property
     def feet(self) -> Float[np.ndarray, "robot foot 3"]:
         """A copy of where the lowest points of the feet are, and the centres over the ground [m]."""
-        centres = self._geoms.reshape(self.size, -1, 3)[:, self._feet]
-        return centres - [0.0, 0.0, 1.0] * self.model.geom_rbound[self._feet, None]
+        points = self._geoms.reshape(self.size, -1, 3)[:, self._feet]
+        upright = np.abs(self._turned.reshape(self.size, -1, 3, 3)[:, self._feet, 2])
+        points[..., 2] -= self._round + (upright * self._extent).sum(axis=-1)
+        return points
 
     def hear(self, command: Float[np.ndarray, "robot 3"]) -> Float[np.ndarray, "robot number"]:
         """What a policy would be shown of them under these commands [m/s, rad/s]."""
@@ -134,6 +139,19 @@ def feet_of(spec: RobotSpec) -> list[int]:
         near = did_you_mean(missing[0], geoms)
         raise RebodyError(f"robot '{spec.name}': [policy] feet names '{missing[0]}', which is no geom.{near or ''}")
     return [geoms[name] for name in named]
+
+
+def extents(model: mujoco.MjModel, geoms: list[int]) -> tuple[Float[np.ndarray, "geom 3"], Float[np.ndarray, " geom"]]:
+    """How far geoms reach from their centres: along their own axes, and from there in every direction [m]. Of other
+    shapes than spheres, capsules and boxes the sphere around them.
+    """
+    along, around = np.zeros((len(geoms), 3)), model.geom_rbound[geoms].copy()
+    for i, (kind, size) in enumerate(zip(model.geom_type[geoms], model.geom_size[geoms], strict=True)):
+        if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+            along[i, 2], around[i] = size[1], size[0]
+        elif kind == mujoco.mjtGeom.mjGEOM_BOX:
+            along[i], around[i] = size, 0.0
+    return along, around
 
 
 def joint_interface(spec: RobotSpec) -> JointInterface:

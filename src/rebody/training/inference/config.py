@@ -67,8 +67,8 @@ class MetaConfig:
     """Disturbances of half of the episodes."""
     switch_share: Share = 0.0
     """Share of episodes in which the task changes once, at any decision."""
-    laws: LawDistribution | None = None
-    """How the laws are drawn that episodes are paid by; each family's own law where there is none."""
+    laws: LawDistribution = field(default_factory=LawDistribution)
+    """How the laws are drawn that episodes are paid by, for a module that hears any law."""
     observation_noise: NotNegative = 0.0
     """Variance of the noise on every observed field (thesis, captions of 6.20)."""
     start: tuple[NotNegative, NotNegative] = (12.0, 3.0)

@@ -117,7 +117,9 @@ def collect(
         carry, belief = encoder.step(carry, Transition(seen, heard, now_seen))
         return (body, now_seen, carry, belief, held, pay), (now_seen, belief, action, heard)
 
-    walk = (body, seen, encoder.initial(shape), belief, held, first_pay(config.laws, law_key, shape))
+    laws = config.laws.draw(law_key, shape) if config.inference.hears_any_law else None
+    pay = first_pay(laws, shape)
+    walk = (body, seen, encoder.initial(shape), belief, held, pay)
     keys = jax.random.split(walk_key, config.decisions)
     known = _known(task, roles, config, known_key)
     active, known = jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), (task, known))

@@ -70,10 +70,9 @@ class Pay(eqx.Module):
         return Pay(self.laws, owed, self.decision + 1), due + noise
 
 
-def first_pay(laws: "LawDistribution | None", key: PRNGKeyArray, shape: tuple[int, ...]) -> Pay:
-    """Before the first decision, by laws that are drawn anew."""
-    drawn = None if laws is None else laws.draw(key, shape)
-    return Pay(drawn, jnp.zeros((LATEST + 1, *shape)), jnp.zeros((), jnp.int32))
+def first_pay(laws: DrawnLaws | None, shape: tuple[int, ...]) -> Pay:
+    """Before the first decision."""
+    return Pay(laws, jnp.zeros((LATEST + 1, *shape)), jnp.zeros((), jnp.int32))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from rebody.tasks import FamilySet
 from rebody.tasks.line import GOAL, JUMP, STAND, VELOCITY, both_ways
 from rebody.tasks.plane import PLANE
 from rebody.training.inference.config import MetaConfig
-from rebody.training.inference.laws import LawDistribution
 
 
 def position() -> MetaConfig:
@@ -170,7 +169,7 @@ def goal_velocity_any() -> MetaConfig:
 
 def _hearing_any_law(base: MetaConfig) -> MetaConfig:
     inference = replace(base.inference, hears_any_law=True, decoded=16)
-    return replace(base, inference=inference, laws=LawDistribution(), evaluate_every=30, held_out_at_end=200)
+    return replace(base, inference=inference, evaluate_every=30, held_out_at_end=200)
 
 
 def _noisy(variance: float) -> MetaConfig:

@@ -77,7 +77,7 @@ def speeds_within(reach: Box, size: int, rng: np.random.Generator) -> Float[np.n
 
 
 def run_robots(
-    spec: RobotSpec, size: int, control_step: Callable[[RobotBatch], None], seconds: float = 10.0
+    spec: RobotSpec, size: int, control_step: Callable[[RobotBatch], object], seconds: float = 10.0
 ) -> tuple[GlobalState, Bool[np.ndarray, " robot"]]:
     """States after each decision, [decision, robot], and which robots fell, moved by whatever does a control step."""
     batch = RobotBatch(spec, size)

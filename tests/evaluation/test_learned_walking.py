@@ -1,21 +1,24 @@
-"""A robot whose walking policy was learned here, and a reward: the whole path, without any extra."""
+"""Robots whose walking policy was learned here, and a reward: the whole path."""
 
 import numpy as np
+import pytest
+from tests.walking import robot_that_is_there
 
 from rebody.agents.parts import load_inference, load_tracker
-from rebody.bodies import load_robot, simulate
+from rebody.bodies import simulate
 from rebody.evaluation.evaluate import evaluate
 from rebody.evaluation.trial import Trial
 from rebody.tasks import SHIPPED
 from rebody.tasks.task_file import TaskSpec
 
 
-def test_a_quadruped_finds_out_what_is_wanted():
+@pytest.mark.parametrize("name", ["ant", "quadruped"])
+def test_a_robot_finds_out_what_is_wanted(name):
     trial = Trial(
         agent="reuse",
         inference=load_inference("plane"),
         families=SHIPPED,
-        robot=load_robot("quadruped"),
+        robot=robot_that_is_there(name),
         tracker=load_tracker("navigator"),
         slots_by="belief",
         sharpen=True,
@@ -28,11 +31,12 @@ def test_a_quadruped_finds_out_what_is_wanted():
         assert episode.return_ > episode.idle_return
 
 
-def test_it_goes_as_it_is_told():
+@pytest.mark.parametrize("name", ["ant", "go1", "quadruped"])
+def test_it_goes_as_it_is_told(name):
     commands = np.array([[1.0, 0.0, 0.0], [-0.8, 0.0, 0.0], [0.0, 0.5, 0.0], [0.5, 0.0, 0.8], [0.0, 0.0, 0.0]])
-    batch = simulate(load_robot("quadruped"), len(commands))
+    batch = simulate(robot_that_is_there(name), len(commands))
     batch.reset(np.random.default_rng(0))
-    for _ in range(200):
+    for _ in range(round(4.0 / batch.step_s)):
         batch.follow(commands)
     x, y = batch.pose()[:, :2].T
     np.testing.assert_allclose([x[0], x[1], y[2]], [4.0, -3.2, 2.0], rtol=0.25)
