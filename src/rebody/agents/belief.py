@@ -105,10 +105,10 @@ class LiveBelief:
         return self._reading
 
     @property
-    def is_unknown(self) -> bool:
-        """Whether no task that the module knows explains the rewards: of sharpened beliefs, by modules that hear any
-        law."""
-        return self._explained is not None and self._explained.is_unknown
+    def unexplained(self) -> int:
+        """How many rewards there were last that no task which the module knows explains; 0 where one does. Only
+        sharpened beliefs of a module that hears any law know."""
+        return self._explained.rewards if self._explained and self._explained.is_unknown else 0
 
     def doubts(self, within_s: float = RECENT_S) -> tuple[str, ...]:
         """Sentences about rewards of the last seconds that no task could have paid, and that were not believed; of a

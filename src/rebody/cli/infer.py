@@ -90,7 +90,7 @@ def _explained(run: BeliefOverTime, log: Log) -> Iterator[str]:
     if share is None or not run.believed:
         return
     yield f"that explains {100 * share:.1f} % of the rewards' variance"
-    if run.is_unknown:
-        found = proposals(log)
+    if run.unexplained:
+        found = proposals(log, run.unexplained)
         yield "what would explain them:" if found else "nor does any quantity that the log has a column for"
         yield from (f"  {proposal}" for proposal in found)

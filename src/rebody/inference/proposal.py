@@ -138,8 +138,8 @@ def _best(
     parameters = fits.parameters[which, start]
     name, place = names[which], np.asarray(expert.place(jnp.asarray(parameters[PARAMETERS:])))
     scale, offset, width = _in_units(name, parameters, half)
-    noise, variance = fits.noise[which, start], np.asarray(np.var(rewards[rows]), np.float32)
-    free = PARAMETERS + quantity.size
+    noise, variance = np.asarray(fits.noise[which, start]), np.asarray(evidence.spread**2)
+    explained = share_explained(noise, variance, np.asarray(len(rows)), PARAMETERS + quantity.size)
     return Proposal(
         quantity=quantity,
         target=tuple((middle + half * place).tolist()),
@@ -147,7 +147,7 @@ def _best(
         scale=scale,
         offset=offset,
         width=width,
-        explained=float(share_explained(noise, variance, np.asarray(len(rows)), free)),
+        explained=float(explained),
         cost=float(fits.cost[which, start]),
     )
 

@@ -32,8 +32,8 @@ class BeliefOverTime:
     """About rewards that no task could have paid."""
     notes: tuple[str, ...] = ()
     """About rewards that no task in the module's ranges would have paid."""
-    is_unknown: bool = False
-    """Whether at the end no task that the module knows explains the rewards."""
+    unexplained: int = 0
+    """How many rewards there were last that no task which the module knows explains."""
 
     @property
     def time_s(self) -> Float[np.ndarray, " decision"]:
@@ -92,8 +92,8 @@ def believe(inference: Inference, decisions: Decisions, sharpen: bool = False) -
     readings = [belief.update(*heard) for heard in zip(states[1:], rewards, strict=True)]
     doubts, notes = belief.doubts(math.inf), belief.notes(math.inf)
     families = inference.contract.families
-    believed, is_unknown = belief.believed, belief.is_unknown
-    return BeliefOverTime(inference.name, families, decisions, readings, believed, doubts, notes, is_unknown)
+    believed, unexplained = belief.believed, belief.unexplained
+    return BeliefOverTime(inference.name, families, decisions, readings, believed, doubts, notes, unexplained)
 
 
 def save_beliefs(run: BeliefOverTime, path: Path) -> None:

@@ -12,12 +12,14 @@ SHOWN = 3
 """Proposals, at most."""
 
 
-def proposals(log: Log) -> list[Proposal]:
-    """The likeliest few that explain enough, by all columns of the log that say what a body did."""
+def proposals(log: Log, rewards: int) -> list[Proposal]:
+    """The likeliest few that explain enough of the last so many rewards, by all columns of the log that say what a body
+    did."""
     decisions = resample(log, tuple(log.fields))
-    # after each decision: what its reward was paid for
-    fields = {field: values[1:] for field, values in decisions.fields.items()}
-    found = propose(_wrapped(fields), decisions.reward)
+    first = np.flatnonzero(np.isfinite(decisions.reward))[-rewards]
+    # entry 0 of states is where the first decision began
+    fields = {field: values[first + 1 :] for field, values in decisions.fields.items()}
+    found = propose(_wrapped(fields), decisions.reward[first:])
     return [each for each in found if each.explained >= LEAST_EXPLAINED][:SHOWN]
 
 
