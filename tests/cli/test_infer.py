@@ -173,3 +173,46 @@ def test_a_log_is_not_written_over(name, place, tmp_path, capsys):
     assert run(["infer", str(log), "--out", str(tmp_path)]) == 2
     assert "would write over what is read" in capsys.readouterr().err
     assert log.read_text() == there.read_text() == LOG.read_text()
+
+
+@pytest.fixture
+def walk(tmp_path):
+    """A function: reward of (x, height) -> log of a body in the plane, with its height beside it."""
+
+    def write(pay):
+        time = 0.1 * np.arange(61)
+        x, y, yaw = 3 * np.sin(0.6 * time), np.sin(0.9 * time), np.sin(0.4 * time)
+        z = 0.5 + 0.1 * np.sin(7 * time) + 0.05 * np.sin(17 * time)
+        poses = {"position_m": x, "position_y_m": y, "yaw_rad": yaw, "position_z_m": z}
+        speeds = {"velocity_m_s": np.gradient(x, 0.1), "velocity_y_m_s": np.gradient(y, 0.1)}
+        columns = {"time_s": time, **poses, **speeds, "battery_v": time, "reward": pay(x, z)}
+        log = tmp_path / "log.csv"
+        with log.open("w", newline="") as file:
+            csv.writer(file).writerows([columns, *zip(*columns.values(), strict=True)])
+        return log
+
+    return write
+
+
+def test_rewards_that_no_known_task_explains_are_explained_by_another_column(walk, capsys):
+    assert run(["infer", str(walk(lambda x, z: 3 - 2 * abs(z - 0.6))), "--inference", "plane-any"]) == 0
+    printed = capsys.readouterr().out
+    assert "not looked at: battery_v\n" in printed
+    assert "doubtful: no task that the module knows explains the last 60 rewards: only " in printed
+    assert (
+        "what would explain them:\n  height (z), target 0.60 m, distance times 2, plus 3; explains 100.0 %" in printed
+    )
+
+
+def test_known_tasks_are_explained_and_nothing_else_is_proposed(walk, capsys):
+    assert run(["infer", str(walk(lambda x, z: 3 - 2 * abs(x - 5))), "--inference", "plane-any"]) == 0
+    printed = capsys.readouterr().out
+    assert "that explains " in printed
+    assert "doubtful: no task" not in printed
+    assert "what would explain them" not in printed
+
+
+def test_noise_is_explained_by_no_column(walk, capsys):
+    noise = np.random.default_rng(0).normal(size=61)
+    assert run(["infer", str(walk(lambda x, z: noise)), "--inference", "plane-any"]) == 0
+    assert "nor does any quantity that the log has a column for" in capsys.readouterr().out

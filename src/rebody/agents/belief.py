@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from rebody import inputs
 from rebody.agents.doubts import RECENT_S, RewardWatch
+from rebody.agents.unknown import Explained, explained
 from rebody.bodies.robot import wrap_angle
 from rebody.errors import RebodyError
 from rebody.inference import Encoder
@@ -42,6 +43,9 @@ class Reading:
     """Of each of the mixture's clusters; empty where there is no mixture."""
     latent: Belief
     """Mean and variance; shapes [latent]."""
+    explained: float | None = None
+    """Share of the rewards' variance that the likeliest task explains, in [0, 1], of sharpened beliefs of a module that
+    hears any law; None for others."""
 
     @property
     def probabilities(self) -> dict[str, float]:
@@ -100,9 +104,16 @@ class LiveBelief:
         self._previous = now
         return self._reading
 
+    @property
+    def unexplained(self) -> int:
+        """How many rewards there were last that no task which the module knows explains; 0 where one does. Only
+        sharpened beliefs of a module that hears any law know."""
+        return self._explained.rewards if self._explained and self._explained.is_unknown else 0
+
     def doubts(self, within_s: float = RECENT_S) -> tuple[str, ...]:
-        """Sentences about rewards of the last seconds that no task could have paid, and that were not believed."""
-        return self._watch.doubts(within_s)
+        """Sentences about rewards of the last seconds that no task could have paid, and that were not believed; of a
+        module that hears any law, about rewards that no task explains."""
+        return self._watch.doubts(within_s) + (self._explained.doubts if self._explained else ())
 
     def notes(self, within_s: float = RECENT_S) -> tuple[str, ...]:
         """Sentences about rewards of the last seconds that no task in the module's ranges would have paid."""
@@ -112,6 +123,7 @@ class LiveBelief:
         read = jax.tree.map(np.asarray, _read(self._reader, self._mixture, belief))
         which, target, probabilities, spreads, shares = read
         families, family = self._reader.families, self._reader.families[which]
+        self._explained: Explained | None = explained(self._inferrer, self._memory)
         clusters = [] if self._mixture is None else np.flatnonzero(self._mixture.active)
         return Reading(
             family=family.name,
@@ -124,6 +136,7 @@ class LiveBelief:
             },
             responsibilities={int(k): float(shares[k]) for k in clusters},
             latent=jax.tree.map(np.asarray, belief),
+            explained=self._explained and self._explained.share,
         )
 
     def _covariances(self, belief: Belief) -> list[Float[jax.Array, "size size"]]:

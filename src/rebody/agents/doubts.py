@@ -45,7 +45,11 @@ class _Seen:
 
 
 class RewardWatch:
-    """Holds each reward against what the tasks of a module could pay in the states before and after it."""
+    """Holds each reward against what the tasks of a module could pay in the states before and after it.
+
+    A module that hears any law can be paid anything: there all is believed (`rebody.agents.unknown` says what no task
+    explains).
+    """
 
     def __init__(self, contract: Contract):
         self._contract = contract
@@ -57,6 +61,8 @@ class RewardWatch:
     def hear(self, previous: GlobalState, state: GlobalState, reward: float) -> bool:
         """Whether a reward can be believed: some target of some family could have paid it, and it is not stuck."""
         self._decisions += 1
+        if self._contract.any_law:
+            return True
         moved = [_moved(family.quantity, previous, state) for family in self._families]
         self._count_same(reward, all(np.any(before != after) for before, after in moved))
         bounds = self._bounds(moved, trained=False)

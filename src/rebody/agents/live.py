@@ -25,6 +25,7 @@ from rebody.agents.parts import (
     tracker_of,
 )
 from rebody.agents.rollout import joint_action
+from rebody.agents.unknown import Explained, explained
 from rebody.bodies import RobotSpec, load_robot
 from rebody.bodies.walking.joystick import navigator_sees
 from rebody.errors import RebodyError
@@ -44,13 +45,18 @@ class AgentStatus:
     """How it stands with an agent."""
 
     mode: Literal["running", "holding", "standing still"]
-    """`holding`: the last command is kept, since the input is bad; `standing still`: it has been for too long."""
+    """`holding`: the last command is kept, since the input is bad; `standing still`: it has been for too long, or no
+    known task explains the rewards and the agent is to stand then."""
     bad_input: str | None
     """What is wrong with the newest observation or reward, if anything is."""
     doubts: tuple[str, ...]
-    """About rewards of the last 3.2 s that no task could have paid; they were not believed."""
+    """About rewards of the last 3.2 s that no task could have paid; they were not believed. Of a module that hears any
+    law: about rewards that no task which it knows explains."""
     notes: tuple[str, ...]
     """About rewards of the last 3.2 s that no task in the module's ranges would have paid."""
+    explained: float | None = None
+    """Share of the rewards' variance that the likeliest task explains, in [0, 1], of sharpened beliefs of a module that
+    hears any law; None for others."""
 
 
 class LiveAgent:
@@ -65,6 +71,7 @@ class LiveAgent:
         horizon: int = HORIZON,
         on_bad_input: str = "error",
         sharpen: bool = True,
+        stands_when_unknown: bool = False,
     ):
         """RebodyError if the module or the tracker does not fit the robot, or `on_bad_input` is none of the two."""
         if on_bad_input not in ON_BAD_INPUT:
@@ -72,6 +79,7 @@ class LiveAgent:
         check_robot_of(tracker, spec)
         inference.contract.check_body(spec.name, spec.moving_fields, tracker.tracker.families.names)
         self._spec, self._inference, self._on_bad_input = spec, inference, on_bad_input
+        self._stands_when_unknown = stands_when_unknown
         # the tracker's own, too: a command to stand still need not be one that the module knows
         self._families = inference.contract.families.beside(tracker.tracker.families)
         self._controller = TrackerController(tracker.tracker, self._families, spec.goal_ahead)
@@ -88,6 +96,7 @@ class LiveAgent:
         self._last_x: Float[np.ndarray, ""] | None = None
         self._carry: Carry | None = None
         self._watch = RewardWatch(self._inference.contract)
+        self._explained: Explained | None = None
         self._trail = deque[Float[np.ndarray, " nq"]](maxlen=self._spec.steps_per_decision + 1)
         self._stick = np.zeros(self._spec.actions)
 
@@ -148,8 +157,10 @@ class LiveAgent:
     @property
     def status(self) -> AgentStatus:
         """Whether the input is good, and whether the rewards can be believed."""
-        mode = "running" if not self._bad_steps else "standing still" if self._stands_still else "holding"
-        return AgentStatus(mode, self._bad_input, self._watch.doubts(), self._watch.notes())
+        mode = "standing still" if self._stands_still else "holding" if self._bad_steps else "running"
+        known = self._explained
+        doubts = self._watch.doubts() + (known.doubts if known else ())
+        return AgentStatus(mode, self._bad_input, doubts, self._watch.notes(), known and known.share)
 
     @property
     def _heard(self) -> Carry:
@@ -166,7 +177,8 @@ class LiveAgent:
 
     @property
     def _stands_still(self) -> bool:
-        return self._bad_steps > round(HOLD_S / self._spec.control_dt)
+        is_lost = self._stands_when_unknown and self._explained is not None and self._explained.is_unknown
+        return is_lost or self._bad_steps > round(HOLD_S / self._spec.control_dt)
 
     def _admit(self, observation: Any, reward: Any) -> tuple[Float[np.ndarray, " observation"], float | None, bool]:
         """What can be used of observation and reward, and whether the observation is whole."""
@@ -205,6 +217,7 @@ class LiveAgent:
         if reward is not None and self._watch.hear(self._carry.previous, state, reward):
             observation = Observation(state, jnp.asarray(reward, jnp.float32))
             self._carry, _ = decide(self._agent, self._carry, observation)
+            self._explained = explained(self._agent.inferrer, self._carry.memory)
             return
         if reward is None:
             self._watch.pass_over()
@@ -220,6 +233,7 @@ def load_agent(
     horizon: int = HORIZON,
     on_bad_input: str = "error",
     sharpen: bool = True,
+    stands_when_unknown: bool = False,
 ) -> LiveAgent:
     """An agent of shipped or own artifacts, ready to `step`; RebodyError if they do not fit together.
 
@@ -227,10 +241,12 @@ def load_agent(
     belief itself, or by a `classifier` where one is given; without `sharpen` the encoder's belief stays as it is, and
     the classifier defaults to `classifier-INFERENCE` (the thesis' way). With `on_bad_input="hold"` a sensor that drops
     out raises nothing: numbers that cannot be are replaced by the last good ones, the last command is kept for at most
-    0.3 s, and then the robot is told to stand still until the input is good again; `status` says so.
+    0.3 s, and then the robot is told to stand still until the input is good again; `status` says so. With
+    `stands_when_unknown` it also stands still while no task that the module knows explains the rewards: of modules that
+    hear any law, sharpened (docs/any-law.md).
     """
     spec, module = load_robot(robot), load_inference(inference)
     by_belief = classifier is None and sharpen and module.can_sharpen
     slots = None if by_belief else load_slots_of(module, classifier)
     tracked = load_tracker(tracker_of(spec) if tracker is None else tracker)
-    return LiveAgent(spec, module, tracked, slots, horizon, on_bad_input, sharpen)
+    return LiveAgent(spec, module, tracked, slots, horizon, on_bad_input, sharpen, stands_when_unknown)

@@ -1,5 +1,6 @@
 """`rebody infer`."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -11,18 +12,22 @@ from rich.markup import escape
 from rebody.agents.parts import load_inference
 from rebody.cli.output import check_output
 from rebody.evaluation.logs import (
+    BeliefOverTime,
     Delimiter,
     Format,
+    Log,
     TimeUnit,
     begun_at_zero,
     believe,
     doubts,
+    proposals,
     read_log,
     resample,
     save_beliefs,
 )
 from rebody.report import plot_beliefs
 from rebody.tasks.family_file import read_families
+from rebody.types import GLOBAL_FIELDS
 
 TABLE, PICTURE = "belief.csv", "belief.png"
 
@@ -40,7 +45,8 @@ class Infer:
     out: Path | None = None
     """Folder for belief.csv and belief.png."""
     sharpen: bool = False
-    """Sharpen beliefs, where the module has experts for it: for rewards of the very states beside them."""
+    """Sharpen beliefs, where the module has experts for it: for rewards of the very states beside them. A module that
+    hears any law always does."""
     skip_bad_rows: bool = False
     """Leave out rows with NaN, unreadable or too large numbers, missing cells, or time stamps that do not ascend, hear
     nothing in gaps of more than 0.3 s, and say how many there were."""
@@ -59,10 +65,11 @@ class Infer:
         inference, console = load_inference(self.inference), Console(soft_wrap=True)
         contract = inference.contract
         form = Format(self.delimiter, self.decimal_comma, self.time_unit)
-        log = begun_at_zero(read_log(self.log, contract.fields, form, self.skip_bad_rows), contract)
+        also = GLOBAL_FIELDS if contract.any_law else ()  # by which rewards may be explained that no known task pays
+        log = begun_at_zero(read_log(self.log, contract.fields, form, self.skip_bad_rows, also), contract)
         decisions = resample(log, contract.fields)
         with console.status(f"{len(decisions.reward)} decisions"):
-            run = believe(inference, decisions, self.sharpen)
+            run = believe(inference, decisions, self.sharpen or contract.any_law)
         for note in (*log.notes, *run.notes):
             console.print(f"note: {note}", markup=False, highlight=False)
         if log.ignored:
@@ -73,3 +80,17 @@ class Infer:
             save_beliefs(run, self.out / TABLE)
             plot_beliefs(run, self.out / PICTURE)
         console.print(f"{inference.name} {run.conclusion()}", highlight=False)
+        for line in _explained(run, log):
+            console.print(line, markup=False, highlight=False)
+
+
+def _explained(run: BeliefOverTime, log: Log) -> Iterator[str]:
+    """How much of the rewards that explains, and what else would explain more; nothing for modules of own laws."""
+    share = run.readings[-1].explained
+    if share is None or not run.believed:
+        return
+    yield f"that explains {100 * share:.1f} % of the rewards' variance"
+    if run.unexplained:
+        found = proposals(log, run.unexplained)
+        yield "what would explain them:" if found else "nor does any quantity that the log has a column for"
+        yield from (f"  {proposal}" for proposal in found)

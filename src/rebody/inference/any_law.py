@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from rebody.inference.decoder import Decoder, Expert
 from rebody.inference.encoder import Encoder, EncoderCarry
-from rebody.inference.fitting import Evidence, Fit, fit
+from rebody.inference.fitting import Evidence, Fit, fit, share_explained
 from rebody.inference.hypotheses import APART, amounts_of, spread_of
 from rebody.inference.inputs import CIRCULAR, scaled
 from rebody.inference.law import LATEST, PARAMETERS, Kind, Late, Rewards, begun, kinds_of, prior_of, rewards_by
@@ -107,14 +107,18 @@ class SharpenedByAnyLaw(eqx.Module):
         return eqx.tree_at(lambda m: m.heard, memory, one(memory.heard, *states))
 
     def explained(self, memory: LawMemory) -> Float[Array, "*batch"]:
-        """Share of the rewards' variance that the likeliest hypothesis explains.
+        """Share of the variance of the remembered rewards that the likeliest hypothesis explains, in [0, 1].
 
-        Near 1 for a known family and law, near 0 for rewards that no known task pays.
+        Near 1 for a known family and law, near 0 for rewards that no known task pays (`share_explained`).
         """
         cost = jnp.stack([each.cost[..., 0] for each in memory.experts], axis=-1)
         noise = jnp.stack([each.noise[..., 0] for each in memory.experts], axis=-1)
-        least = jnp.take_along_axis(noise, jnp.argmin(cost, axis=-1)[..., None], axis=-1)[..., 0]
-        return jnp.clip(1 - (least / memory.heard.spread) ** 2, 0.0, 1.0)
+        free = jnp.asarray([PARAMETERS + len(expert.fields) for expert in self.decoder.experts])
+        best = jnp.argmin(cost, axis=-1)
+        least = jnp.take_along_axis(noise, best[..., None], axis=-1)[..., 0]
+        # an entry that stands for many rewards is one number still
+        entries = jnp.sum(memory.heard.weights > 0, axis=-1)
+        return share_explained(least, memory.heard.variance, entries, free[best])
 
     def _scaled(self, state):
         return scaled(state, self.encoder.fields, self.encoder.scales)

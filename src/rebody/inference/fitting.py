@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float
+from jaxtyping import Array, Float, Int, Num
 
 from rebody.inference.decoder import Expert
 from rebody.inference.law import DELAY, LATEST, PARAMETERS, Kind, Late, LawPrior, rewards_by
@@ -44,7 +44,30 @@ class Fit(NamedTuple):
     """Standard deviation of the rewards about it, in their unit."""
 
 
-def fit(expert: Expert, evidence: Evidence, kind: Kind, prior: LawPrior, start: Float[AnyArray, " parameter"]) -> Fit:
+def share_explained(
+    noise: Float[AnyArray, "*batch"],
+    variance: Float[AnyArray, "*#batch"],
+    rewards: Num[AnyArray, "*#batch"],
+    free: Int[AnyArray, "*#batch"] | int,
+) -> Float[Array, "*batch"]:
+    """Share of a variance that is explained where so much noise is left, in [0, 1].
+
+    So many free parameters explain some of any rewards, which is taken off (the adjusted R^2 of Ezekiel 1930); 0 where
+    there are no more rewards than parameters.
+    """
+    spare = rewards - free
+    share = 1 - noise**2 / variance * (rewards - 1) / jnp.maximum(spare, 1)
+    return jnp.where(spare > 0, jnp.clip(share, 0.0, 1.0), 0.0)
+
+
+def fit(
+    expert: Expert,
+    evidence: Evidence,
+    kind: Kind,
+    prior: LawPrior,
+    start: Float[AnyArray, " parameter"],
+    steps: int = STEPS,
+) -> Fit:
     """Damped Gauss-Newton steps from a start, never anywhere worse."""
     floor = COUNTS * (EXACT * evidence.spread) ** 2
     count, weigh = jnp.sum(evidence.weights) + COUNTS, jnp.sqrt(evidence.weights)
@@ -76,7 +99,7 @@ def fit(expert: Expert, evidence: Evidence, kind: Kind, prior: LawPrior, start: 
         return (*ended, damping * jnp.where(helped, LESS, MORE)), None
 
     begun = (start, unlikely(start), jnp.asarray(FIRST_DAMPING))
-    (parameters, cost, _), _ = jax.lax.scan(step, begun, length=STEPS)
+    (parameters, cost, _), _ = jax.lax.scan(step, begun, length=steps)
     slope, noise = slopes(parameters)
     root = root_of(slope, jnp.diag(1 / prior.deviation))
     volume = -0.5 * log_determinant(root) - jnp.sum(jnp.log(prior.deviation))

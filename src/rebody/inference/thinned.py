@@ -40,6 +40,19 @@ class Thinned(eqx.Module):
         return jnp.maximum(jnp.sqrt(squared / jnp.maximum(count, 1)), 1e-3 * jnp.abs(mean) + SMALLEST)
 
     @property
+    def heard(self) -> Float[Array, "*batch"]:
+        """How many rewards the entries stand for: all since the task became another one."""
+        return jnp.sum(self.weights, axis=-1)
+
+    @property
+    def variance(self) -> Float[Array, "*batch"]:
+        """Of the rewards that are kept, each as often as it stands for; never 0."""
+        count = jnp.maximum(self.heard, 1.0)
+        mean = jnp.sum(self.weights * self.rewards, axis=-1) / count
+        squared = jnp.sum(self.weights * (self.rewards - mean[..., None]) ** 2, axis=-1) / count
+        return jnp.maximum(squared, (1e-3 * jnp.abs(mean) + SMALLEST) ** 2)
+
+    @property
     def ends(self) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
         """The lowest and the highest reward that is kept."""
         there = self.weights > 0

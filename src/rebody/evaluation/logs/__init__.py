@@ -5,6 +5,7 @@ from rebody.evaluation.logs.doubts import doubts
 from rebody.evaluation.logs.file import COLUMNS, Log, read_log
 from rebody.evaluation.logs.format import Delimiter, Format, TimeUnit
 from rebody.evaluation.logs.origin import begun_at_zero
+from rebody.evaluation.logs.proposals import proposals
 from rebody.evaluation.logs.resample import Decisions, resample
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "begun_at_zero",
     "believe",
     "doubts",
+    "proposals",
     "read_log",
     "resample",
     "save_beliefs",

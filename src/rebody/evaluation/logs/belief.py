@@ -32,6 +32,8 @@ class BeliefOverTime:
     """About rewards that no task could have paid."""
     notes: tuple[str, ...] = ()
     """About rewards that no task in the module's ranges would have paid."""
+    unexplained: int = 0
+    """How many rewards there were last that no task which the module knows explains."""
 
     @property
     def time_s(self) -> Float[np.ndarray, " decision"]:
@@ -90,7 +92,8 @@ def believe(inference: Inference, decisions: Decisions, sharpen: bool = False) -
     readings = [belief.update(*heard) for heard in zip(states[1:], rewards, strict=True)]
     doubts, notes = belief.doubts(math.inf), belief.notes(math.inf)
     families = inference.contract.families
-    return BeliefOverTime(inference.name, families, decisions, readings, belief.believed, doubts, notes)
+    believed, unexplained = belief.believed, belief.unexplained
+    return BeliefOverTime(inference.name, families, decisions, readings, believed, doubts, notes, unexplained)
 
 
 def save_beliefs(run: BeliefOverTime, path: Path) -> None:

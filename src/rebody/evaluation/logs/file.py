@@ -51,15 +51,22 @@ class Log:
     """Sentences about what was left out or changed."""
 
 
-def read_log(path: Path, fields: tuple[str, ...], form: Format | None = None, skip_bad_rows: bool = False) -> Log:
-    """What a module that sees these fields needs of a log; RebodyError that says what is wrong with it and where.
+def read_log(
+    path: Path,
+    fields: tuple[str, ...],
+    form: Format | None = None,
+    skip_bad_rows: bool = False,
+    also: tuple[str, ...] = (),
+) -> Log:
+    """What a module that sees these fields needs of a log, and what there is of others; RebodyError that says what is
+    wrong with it and where.
 
     `skip_bad_rows` leaves damaged rows out and accepts gaps, and says so in the log's notes.
     """
     form = form or Format()
     check_format(path, TIME, (*(COLUMNS[field] for field in fields), REWARD), form)
     with open_table(path, form.separator) as table:
-        used = _used_fields(table, fields, form)
+        used = _used_fields(table, fields, form, also)
         names = (TIME, *(COLUMNS[field] for field in used), REWARD)
         ignored = tuple(name for name in table.names if name and name not in names)
         rows = in_order(read_rows(table, names, form, skip_bad_rows), skip_bad_rows)
@@ -70,16 +77,16 @@ def read_log(path: Path, fields: tuple[str, ...], form: Format | None = None, sk
     return Log(path, time_s, columns, rows.columns[REWARD], ignored, tuple(notes))
 
 
-def _used_fields(table: Table, fields: tuple[str, ...], form: Format) -> list[str]:
-    """The fields, and what is displaced where it is there: a velocity is better told by positions."""
+def _used_fields(table: Table, fields: tuple[str, ...], form: Format, also: tuple[str, ...]) -> list[str]:
+    """The fields, and what is displaced where it is there: a velocity is better told by positions. Then the others."""
     needed = [TIME, *(COLUMNS[field] for field in fields), REWARD]
     if missing := [name for name in needed if name not in table.names]:
         raise RebodyError(
             f"{table.path} lacks {', '.join(missing)}. The module needs the columns {', '.join(needed)}; there are "
             f"{', '.join(table.names)}. The first line names the columns, with {form.delimiter}s between them."
         )
-    positions = [RATE_OF[field] for field in fields if field in RATE_OF]
-    return [*fields, *(p for p in positions if p not in fields and COLUMNS[p] in table.names)]
+    others = dict.fromkeys((*(RATE_OF[field] for field in fields if field in RATE_OF), *also))
+    return [*fields, *(field for field in others if field not in fields and COLUMNS[field] in table.names)]
 
 
 def _seconds(rows: Rows, form: Format) -> tuple[Float[np.ndarray, " row"], list[str]]:
