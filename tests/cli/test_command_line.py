@@ -107,7 +107,7 @@ def test_run_draws_an_episode(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (["train", "tracker", "hoper", "--out", "x"], "Did you mean 'hopper'"),
         (
             ["robot", "check", "hoper"],
-            "Robots are: cheetah, hopper, quadruped, walker, or the path of a robot's",
+            "Robots are: ant, berkeley, cheetah, go1, hopper, quadruped, walker, or the path of a robot's",
         ),
         (["robot", "check", "none.toml"], "cannot read the robot's file 'none.toml'"),
         (["stress", "--robot", "./none.toml"], "cannot read the robot's file 'none.toml'"),
