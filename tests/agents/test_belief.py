@@ -10,7 +10,7 @@ import pytest
 import rebody
 from rebody.agents.build import build_agent
 from rebody.agents.configs import InferenceSettings
-from rebody.agents.parts import Inference, inference_template
+from rebody.agents.parts import Inference, inference_template, load_inference
 from rebody.agents.rollout import rollout_on_toy
 from rebody.bodies.toys import MassDamper
 from rebody.errors import RebodyError
@@ -157,6 +157,17 @@ def test_what_was_not_heard_changes_no_belief(inference):
     np.testing.assert_array_equal(held.latent.mean, reading.latent.mean)
     assert not np.array_equal(heard.latent.mean, held.latent.mean)
     assert belief.doubts() == ()
+
+
+def test_a_late_reward_can_be_for_a_state_in_which_nothing_was_heard():
+    """Every second reward is lost, and each comes a decision late: all that is paid is paid for the states between."""
+    belief = load_inference("goal-velocity-any").begin({"x": 0.0, "vx": 0.0}, sharpen=True)
+    x = 4 * np.sin(0.15 * np.arange(60))
+    for i in range(1, len(x)):
+        reading = belief.update({"x": x[i], "vx": (x[i] - x[i - 1]) / 0.1}, None if i % 2 else 2 - abs(x[i - 1] - 3))
+    assert reading.family == "goal"
+    assert reading.target == pytest.approx((3.0,), abs=0.01)
+    assert reading.explained == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("impossible", [7.0, 0.5])

@@ -88,7 +88,7 @@ def test_a_memory_keeps_what_differs():
 
     def take(heard, x):
         heard = heard.seeing(jnp.stack([x, 0.0 * x]))
-        return heard.hearing(x - 1, FIELDS, SCALES), None
+        return heard.hearing(x - 1, heard.states[:, 0, 0] - 1, FIELDS, SCALES), None
 
     heard, _ = jax.lax.scan(take, heard, jnp.asarray(way, jnp.float32))
     assert float(heard.weights.sum()) == len(way)
@@ -96,6 +96,23 @@ def test_a_memory_keeps_what_differs():
     np.testing.assert_allclose(kept[:20], way[:20] - 1, atol=1e-6)
     assert (np.asarray(heard.weights)[:19] == 1).all()
     assert len(kept) == HEARD
+
+
+def test_noise_is_averaged_where_a_body_stands():
+    """Each entry is the mean of as many rewards as it has weight, with what is expected between its states added."""
+    noise = np.random.default_rng(0).normal(0.0, 0.1, 400)
+    way = np.concatenate([np.linspace(0.0, 1.0, 20), np.ones(380)])
+
+    def take(heard, now):
+        x, paid = now
+        heard = heard.seeing(jnp.stack([x, 0.0 * x]))
+        return heard.hearing(paid, heard.states[:, 0, 0], FIELDS, SCALES), None
+
+    inputs = tuple(jnp.asarray(each, jnp.float32) for each in (way, way + noise))
+    heard, _ = jax.lax.scan(take, nothing_heard((), 1, 2), inputs)
+    off, weights = np.asarray(heard.rewards - heard.states[:, 0, 0]), np.asarray(heard.weights)
+    assert weights @ off == pytest.approx(noise.sum(), abs=1e-2)
+    assert abs(off[weights > 20]).max() < 0.05
 
 
 def test_rewards_are_normalised_alike_along_and_one_by_one():

@@ -94,13 +94,15 @@ class LiveBelief:
         heard = inputs.reward(reward, where)
         now = _global_state(self._fields, state, self._previous, where)
         self._decision += 1
+        transition = Transition(self._previous, np.asarray(heard or 0.0, np.float32), now)
         if heard is None:
             self._watch.pass_over()
-        elif self._watch.hear(self._previous, now, heard):
-            transition = Transition(self._previous, np.asarray(heard, np.float32), now)
+        if heard is not None and self._watch.hear(self._previous, now, heard):
             self._memory, belief = _take_in(self._inferrer, self._memory, transition)
             self._reading = self._read(belief)
             self.believed += 1
+        else:
+            self._memory = _pass_over(self._inferrer, self._memory, transition)
         self._previous = now
         return self._reading
 
@@ -184,6 +186,11 @@ def _take_in(
     inferrer: Encoder | Sharpened | SharpenedByAnyLaw, memory: Any, transition: Transition
 ) -> tuple[Any, Belief]:
     return inferrer.step(memory, transition)
+
+
+@eqx.filter_jit
+def _pass_over(inferrer: Encoder | Sharpened | SharpenedByAnyLaw, memory: Any, transition: Transition) -> Any:
+    return inferrer.unheard(memory, transition)
 
 
 @eqx.filter_jit

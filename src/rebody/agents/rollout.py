@@ -104,11 +104,10 @@ class Drive:
         """
         body, held = self._body, self.command
         if self._controller is None:
-            action = np.asarray(held.action)
-            body.step(action)
+            body.step(np.asarray(held.action))
         else:
-            action = follow(self._controller, body, held.subgoal, self.carry.belief)
-        self._actions.append(action)
+            follow(self._controller, body, held.subgoal, self.carry.belief)
+        self._actions.append(body.joint_actions)
         self.steps, self._steps_left = self.steps + 1, self._steps_left - 1
         due = self._steps_left == 0
         if not due.any() and self.steps % body.steps_per_decision:

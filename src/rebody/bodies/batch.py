@@ -103,7 +103,8 @@ class RobotBatch(Simulation):
         """RebodyError if a simulation diverged."""
         low, high = self.spec.model.actuator_ctrlrange.T
         # centre and half-width, so that an action in a range of [-1, 1] arrives without rounding
-        self._ctrl[:] = 0.5 * (low + high) + 0.5 * (high - low) * np.clip(actions, -1.0, 1.0)
+        self.joint_actions = np.clip(actions, -1.0, 1.0)
+        self._ctrl[:] = 0.5 * (low + high) + 0.5 * (high - low) * self.joint_actions
         self._advance()
 
     def _advance(self) -> None:

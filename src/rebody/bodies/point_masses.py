@@ -60,6 +60,7 @@ class PointMasses(Simulation):
     @own_jax_settings()
     def step(self, actions):
         """One decision."""
+        self.joint_actions = np.clip(actions, -1.0, 1.0)
         self._state = np.array(_advance(self._toy, self._state, actions.astype(np.float32)))
 
     def observe(self):

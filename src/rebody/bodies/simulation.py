@@ -27,6 +27,9 @@ class Simulation(ABC):
     steps_per_decision: int
     root: int
     """Id in the model of the body that a camera follows."""
+    joint_actions: Float[np.ndarray, "body joint"]
+    """What moved the joints in the last step, as a control cost counts it: the clipped action; of a robot that walks by
+    a policy, what the policy said."""
 
     @property
     def step_s(self) -> float:

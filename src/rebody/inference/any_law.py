@@ -125,7 +125,8 @@ class SharpenedByAnyLaw(eqx.Module):
 
     def _of_one_body(self, memory: LawMemory, guess: Belief, previous, state, reward) -> tuple[LawMemory, Belief]:
         heard = self._seeing(memory.heard, previous, state)
-        heard = heard.hearing(reward, self.encoder.fields, self.encoder.scales)
+        expected = self._expected(memory.experts, heard.states)
+        heard = heard.hearing(reward, expected, self.encoder.fields, self.encoder.scales)
         log_share, guesses = proposed(self.decoder, guess)
         before = self._likeliest(memory.experts)
         experts = tuple(
@@ -175,6 +176,22 @@ class SharpenedByAnyLaw(eqx.Module):
     def _read(self, expert: Expert, states):
         return self.decoder.read(expert, states)
 
+    def _expected(
+        self, experts: tuple[LawHypotheses, ...], states: Float[AnyArray, "heard late field"]
+    ) -> Float[Array, " heard"]:
+        """What the likeliest hypothesis says is paid in these states."""
+        best, _ = self._likeliest(experts)
+        of_each = [
+            rewards_by(
+                expert,
+                Late.of(expert, self._read(expert, states)),
+                jax.tree.map(lambda column: column[0], each.kind),
+                each.parameters[0],
+            )
+            for expert, each in zip(self.decoder.experts, experts, strict=True)
+        ]
+        return jnp.stack(of_each)[best]
+
     def _likeliest(self, experts: tuple[LawHypotheses, ...]):
         """Index of the expert, and the noise about it."""
         best = jnp.argmin(jnp.stack([each.cost[0] for each in experts]))
@@ -183,18 +200,8 @@ class SharpenedByAnyLaw(eqx.Module):
     def _surprised(self, memory: LawMemory, before, reward) -> LawMemory:
         """With the older rewards forgotten where the task has become another one."""
         heard, (_, noise_before) = memory.heard, before
-        best, noise = self._likeliest(memory.experts)
-        newest = jnp.stack(
-            [
-                rewards_by(
-                    expert,
-                    Late.of(expert, self._read(expert, heard.recent)[None]),
-                    jax.tree.map(lambda column: column[0], each.kind),
-                    each.parameters[0],
-                )[0]
-                for expert, each in zip(self.decoder.experts, memory.experts, strict=True)
-            ]
-        )[best]
+        _, noise = self._likeliest(memory.experts)
+        (newest,) = self._expected(memory.experts, heard.recent[None])
         level = jnp.where(memory.surprises > 0, memory.noise, noise_before)
         is_settled = jnp.sum(heard.weights) > SETTLED
         is_odd = (jnp.abs(reward - newest) > SURPRISED * level) & (noise > 2 * level) & is_settled

@@ -18,12 +18,12 @@ from rebody.types import AnyArray
 STEPS = 5
 """Of Gauss and Newton at a decision; hypotheses go on from where they were."""
 EXACT, COUNTS = 1e-3, 1.0
-"""Standard deviation of rewards that is expected, as a share of their spread, and how many rewards that counts as."""
+"""Standard deviation of rewards that is expected, as a share of their spread, and how many entries that counts as."""
 FIRST_DAMPING, LESS, MORE, RIDGE = 1e-2, 0.2, 8.0, 1e-6
 
 
 class Evidence(NamedTuple):
-    """What is to be explained: rewards, weighted, and the states that an expert reads beside them."""
+    """What is to be explained: rewards, each the mean of `weights` of them, and the states that an expert reads."""
 
     states: Late
     rewards: Float[AnyArray, " heard"]
@@ -70,7 +70,8 @@ def fit(
 ) -> Fit:
     """Damped Gauss-Newton steps from a start, never anywhere worse."""
     floor = COUNTS * (EXACT * evidence.spread) ** 2
-    count, weigh = jnp.sum(evidence.weights) + COUNTS, jnp.sqrt(evidence.weights)
+    # an entry is a mean of `weights` rewards: one squared error, of a variance that is smaller by as much
+    count, weigh = jnp.sum(evidence.weights > 0) + COUNTS, jnp.sqrt(evidence.weights)
 
     def errors(parameters):
         return weigh * (evidence.rewards - rewards_by(expert, evidence.states, kind, parameters))

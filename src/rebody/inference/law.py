@@ -25,6 +25,8 @@ OFFSET, LOG_SCALE, EXPONENT, LOG_WIDTH, DELAY = range(PARAMETERS)
 FAR = 1.0
 """Standard deviation of places, in units of the encoder's scales."""
 TINY = 1e-8
+DELAYS = (0.3, 1.0, 2.0, 3.0)
+"""Decisions that a hypothesis may begin at: from none, the squared error of late rewards has other minima."""
 STEEP = 30.0
 """How sharp the corner of a clipped law is."""
 
@@ -138,13 +140,22 @@ def begun(
     amounts: Float[AnyArray, " amount"],
     spread: Float[AnyArray, ""],
 ) -> Float[Array, " parameter"]:
-    """A place with the law of that kind that suits it best: offset and scale by linear regression."""
-    law = jnp.stack([jnp.asarray(x, jnp.float32) for x in (0.0, 0.0, kind.exponent, kind.log_width, 0.3)])
-    start = jnp.concatenate([law, amounts])
-    paid = rewards_by(expert, late, kind, start)
+    """A place with the law of that kind that suits it best: offset and scale by linear regression at each of `DELAYS`,
+    of which the one with the smallest squared error is taken."""
     count = jnp.maximum(jnp.sum(weights), 1.0)
-    about_paid, about_rewards = jnp.sum(weights * paid) / count, jnp.sum(weights * rewards) / count
-    together = jnp.sum(weights * (paid - about_paid) * (rewards - about_rewards))
-    alone = jnp.sum(weights * (paid - about_paid) ** 2)
-    scale = jnp.clip(together / (alone + TINY), 0.02 * spread, 1e3 * spread)
-    return start.at[OFFSET].set(about_rewards - scale * about_paid).at[LOG_SCALE].set(jnp.log(scale))
+    mean_reward = jnp.sum(weights * rewards) / count
+
+    def regressed(delay):
+        law = jnp.stack([jnp.asarray(x, jnp.float32) for x in (0.0, 0.0, kind.exponent, kind.log_width, delay)])
+        start = jnp.concatenate([law, amounts])
+        paid = rewards_by(expert, late, kind, start)
+        mean_paid = jnp.sum(weights * paid) / count
+        covariance = jnp.sum(weights * (paid - mean_paid) * (rewards - mean_reward))
+        variance = jnp.sum(weights * (paid - mean_paid) ** 2)
+        scale = jnp.clip(covariance / (variance + TINY), 0.02 * spread, 1e3 * spread)
+        offset = mean_reward - scale * mean_paid
+        squared = jnp.sum(weights * (rewards - offset - scale * paid) ** 2)
+        return start.at[OFFSET].set(offset).at[LOG_SCALE].set(jnp.log(scale)), squared
+
+    starts, squared = jax.vmap(regressed)(jnp.asarray(DELAYS))
+    return starts[jnp.argmin(squared)]

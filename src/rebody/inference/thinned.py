@@ -1,7 +1,8 @@
-"""What was heard since the task began, in a buffer of fixed size: of neighbours that say the same, one stays.
+"""What was heard since the task began, in a buffer of fixed size: neighbours that say the same become one.
 
 Neighbours in time are merged by Ward's criterion (1963): a body that stands at its goal repeats itself, and what was
-learned on the way there stays for ever.
+learned on the way there stays for ever. The newer state stays; its reward becomes the mean of both, less what the
+likeliest hypothesis says lies between the states. So noise is averaged, and exact rewards stay exact.
 """
 
 import equinox as eqx
@@ -26,7 +27,7 @@ class Thinned(eqx.Module):
     """Of each reward the state then, and those of the decisions before."""
     rewards: Float[AnyArray, "*batch heard"]
     weights: Float[AnyArray, "*batch heard"]
-    """How many rewards each stands for; 0 for none."""
+    """How many rewards each is the mean of; 0 for none."""
     recent: Float[AnyArray, "*batch late field"]
     """The last states, the newest first, heard in or not."""
     has_seen: Bool[AnyArray, "*batch"]
@@ -46,10 +47,10 @@ class Thinned(eqx.Module):
 
     @property
     def variance(self) -> Float[Array, "*batch"]:
-        """Of the rewards that are kept, each as often as it stands for; never 0."""
-        count = jnp.maximum(self.heard, 1.0)
-        mean = jnp.sum(self.weights * self.rewards, axis=-1) / count
-        squared = jnp.sum(self.weights * (self.rewards - mean[..., None]) ** 2, axis=-1) / count
+        """Of one reward about the mean of all, as far as means of some tell; never 0."""
+        mean = jnp.sum(self.weights * self.rewards, axis=-1) / jnp.maximum(self.heard, 1.0)
+        entries = jnp.maximum(jnp.sum(self.weights > 0, axis=-1), 1)
+        squared = jnp.sum(self.weights * (self.rewards - mean[..., None]) ** 2, axis=-1) / entries
         return jnp.maximum(squared, (1e-3 * jnp.abs(mean) + SMALLEST) ** 2)
 
     @property
@@ -65,22 +66,31 @@ class Thinned(eqx.Module):
         recent = jnp.concatenate([state[None], before[:-1]])
         return eqx.tree_at(lambda t: (t.recent, t.has_seen), self, (recent, jnp.ones_like(self.has_seen)))
 
-    def hearing(self, reward: Float[AnyArray, ""], fields: tuple[str, ...], scales: tuple[float, ...]) -> "Thinned":
-        """Of one body: after one more reward, paid in the newest state or shortly before."""
+    def hearing(
+        self,
+        reward: Float[AnyArray, ""],
+        expected: Float[AnyArray, " heard"],
+        fields: tuple[str, ...],
+        scales: tuple[float, ...],
+    ) -> "Thinned":
+        """Of one body: after one more reward, paid in the newest state or shortly before.
+
+        `expected` is what the likeliest hypothesis says of the rewards that are kept.
+        """
         moments = _moments(self.moments, reward)
         now = eqx.tree_at(lambda t: t.moments, self, moments)
-        kept, weights, last = now._room(fields, scales)
+        kept, rewards, weights, last = now._room(expected, fields, scales)
         return Thinned(
             jnp.asarray(self.states)[kept].at[last].set(self.recent),
-            jnp.asarray(self.rewards)[kept].at[last].set(reward),
+            rewards.at[last].set(reward),
             weights.at[last].set(1.0),
             self.recent,
             self.has_seen,
             moments,
         )
 
-    def _room(self, fields, scales):
-        """Which entries stay and what they stand for then, and where a new one goes."""
+    def _room(self, expected, fields, scales):
+        """Which entries stay, their rewards and weights then, and where a new one goes."""
         is_full, places = self.weights[-1] > 0, jnp.arange(len(self.weights))
         states, rewards = self.states[:, 0], self.rewards / self.spread
         off = jnp.sum((FINE * apart(states[1:], states[:-1], fields, scales)) ** 2, axis=-1)
@@ -88,9 +98,13 @@ class Thinned(eqx.Module):
         first, then = self.weights[:-1], self.weights[1:]
         least = jnp.argmin(off * first * then / jnp.maximum(first + then, 1.0))
         merged = jnp.asarray(self.weights).at[least + 1].add(self.weights[least])
+        left = self.rewards - expected
+        mean = (first * left[:-1] + then * left[1:]) / jnp.maximum(first + then, 1.0)
+        averaged = jnp.asarray(self.rewards).at[least + 1].set((expected[1:] + mean)[least])
         kept = jnp.where(is_full, jnp.minimum(places + (places >= least), len(places) - 1), places)
+        rewards = jnp.where(is_full, averaged[kept], self.rewards)
         weights = jnp.where(is_full, merged[kept], self.weights)
-        return kept, weights, jnp.where(is_full, len(places) - 1, jnp.sum(self.weights > 0))
+        return kept, rewards, weights, jnp.where(is_full, len(places) - 1, jnp.sum(self.weights > 0))
 
     def forgetting(self, forget: Bool[AnyArray, ""], but: int) -> "Thinned":
         """Of one body: with the newest few rewards alone, where all others are to be forgotten."""

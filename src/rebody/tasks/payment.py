@@ -73,7 +73,8 @@ class Payment:
     exponent: Annotated[float, Meta(ge=0.25, le=4.0)] = 1.0
     """Of the form `power`."""
     control_cost: NotNegative = 0.0
-    """Times the mean squared action of the joints: a price that is no part of the task."""
+    """Times the mean squared action of the joints: a price that is no part of the task. A robot that walks by a policy
+    pays for what the policy says."""
     noise: NotNegative = 0.0
     """Standard deviation of what is heard around what is earned, in the reward's unit."""
     delay_s: Annotated[float, Meta(ge=0.0, le=MOST_LATE_S)] = 0.0

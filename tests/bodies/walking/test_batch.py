@@ -32,6 +32,15 @@ def test_a_cart_goes_where_the_stick_says(cart):
     np.testing.assert_allclose(seen[:3, [0, 0, 2]].diagonal(), [1.0, -0.8, 1.25], atol=0.1)
 
 
+def test_a_control_cost_counts_what_the_policy_says(cart):
+    batch = simulate(cart, 2)
+    batch.reset(np.random.default_rng(0))
+    run(batch, np.array([[0.0, 0, 0], [1.0, 0, 0]]), 20)
+    assert batch.joint_actions.shape == (2, len(batch.joints.names))
+    still, moving = np.abs(batch.joint_actions).max(axis=1)
+    assert still < 0.05 < moving
+
+
 def test_a_state_continues_and_a_reset_forgets(cart):
     first, second = simulate(cart, 2), simulate(cart, 2)
     actions = np.array([[0.5, 0, 0.3], [-0.2, 0, 1.0]])

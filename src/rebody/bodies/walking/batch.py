@@ -54,6 +54,7 @@ class GaitBatch(RobotBatch):
 
     def _move(self, targets: Float[np.ndarray, "robot joint"]) -> None:
         """A control step with joints on their way to these positions [rad]."""
+        self.joint_actions = self.gait.last_action
         self._ctrl[:, self.joints.actuators] = targets
         self._advance()
 
