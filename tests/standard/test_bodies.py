@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from rebody.bodies import load_robot, shipped_robots, simulate
+from rebody.bodies import load_robot, simulate
 from rebody.errors import RebodyError
 from rebody.tasks.task_file import TaskSpec
 from rebody.types import POSE_FIELDS
@@ -49,7 +49,6 @@ def test_a_robot_of_another_kind_is_refused(benchmark):
         benchmark.in_environments(load_robot("hopper"), "rebody-standard/CheetahVel-v0", 1)
 
 
-@pytest.mark.skipif("ant" not in shipped_robots(), reason="no robot 'ant' ships")
 def test_an_ant_walks_there_as_by_itself(benchmark):
     spec = load_robot("ant")
     robots, alone = benchmark.in_environments(spec, "rebody-standard/AntGoal-v0", 1), simulate(spec, 1, threads=1)
