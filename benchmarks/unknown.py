@@ -164,7 +164,8 @@ def auroc(known: Float[np.ndarray, " episode"], alien: Float[np.ndarray, " episo
         return float(roc_auc_score(label, np.concatenate([known, alien])))
 
     drawn = [of(rng.choice(known, len(known)), rng.choice(alien, len(alien))) for _ in range(RESAMPLED)]
-    return of(known, alien), *map(float, np.quantile(drawn, [0.025, 0.975]))
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return of(known, alien), float(low), float(high)
 
 
 def proposals(states: GlobalState) -> Any:
