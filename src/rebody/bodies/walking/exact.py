@@ -21,6 +21,7 @@ class ExactWalkers(WalkingBatch):
 
     def follow(self, command):
         """A control step: the root moves, joints stay as they are."""
+        self.joint_actions = self.gait.last_action
         before, (ahead, left, turn) = self._root(), self.spec.control_dt * np.asarray(command, float).T
         x, y, yaw = self.pose()[:, [0, 1, POSE_FIELDS.index("yaw")]].T
         cos, sin = np.cos(yaw + turn / 2), np.sin(yaw + turn / 2)
